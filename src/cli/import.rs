@@ -70,14 +70,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
         tx: arguments.tx,
         sets: common.set.clone(),
     };
-    let labels = arguments.label.iter().map(|label| {
-        let (name, text) = label.split_once('=').ok_or_else(|| Error::Usage {
-            message: format!("`--label {label}` is no label"),
-            hint: Some("write --label name=text, such as --label action=walk".into()),
-        })?;
-        Ok((name.trim().to_string(), text.trim().to_string()))
-    });
-    let labels = labels.collect::<Result<BTreeMap<_, _>>>()?;
+    let labels = labels(&arguments.label)?;
     let what = Import { sources: &arguments.sources, stated: &stated, labels, as_stated: common.as_stated, out: &arguments.out };
     let against = if common.as_stated { Against::Kept } else { Against::Refused };
     let mut show = |seen: Seen<'_>, _: &mut Notify<'_>| match seen {
@@ -100,4 +93,39 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     made.iter().for_each(|folder| say!("imported: {}", folder.display()));
     Ok(())
+}
+
+/// Labels as they are written, `name=text`.
+fn labels(written: &[String]) -> Result<BTreeMap<String, String>> {
+    let mut labels = BTreeMap::new();
+    for label in written {
+        let (name, text) = label.split_once('=').ok_or_else(|| Error::Usage {
+            message: format!("`--label {label}` is no label"),
+            hint: Some("write --label name=text, such as --label action=walk".into()),
+        })?;
+        let (name, text) = (name.trim().to_string(), text.trim().to_string());
+        if let Some(earlier) = labels.insert(name.clone(), text) {
+            return Err(Error::Usage {
+                message: format!("`--label {label}` follows `--label {name}={earlier}`, expected one text for each name"),
+                hint: Some("leave one of them out, or give them two names".into()),
+            });
+        }
+    }
+    Ok(labels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::labels;
+
+    #[test]
+    fn a_name_of_a_label_stands_once() {
+        let of = |written: &[&str]| labels(&written.iter().map(|label| label.to_string()).collect::<Vec<_>>());
+        let two = of(&["action=walk", "subject = s1"]).unwrap();
+        assert_eq!((two["action"].as_str(), two["subject"].as_str()), ("walk", "s1"));
+        let error = of(&["action=walk", "action=run"]).unwrap_err();
+        let said = "`--label action=run` follows `--label action=walk`, expected one text for each name";
+        assert!(error.to_string().ends_with(said) && error.hint().is_some(), "{error}");
+        assert!(of(&["action"]).unwrap_err().to_string().contains("is no label"));
+    }
 }

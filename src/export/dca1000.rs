@@ -17,7 +17,7 @@ use crate::error::Result;
 pub fn write(source: &mut Source, folder: &Path) -> Result<Vec<String>> {
     let mut notes = Vec::new();
     let radar = &source.recording.radar;
-    let wiring = Wiring::of(radar, source.board, &mut notes)?;
+    let wiring = Wiring::of(radar, source.board, false, &mut notes)?;
     let described = Described::of(radar, &wiring, &mut notes);
     notes.extend(not_carried(source.recording, &["which chirps were lost", "room", "body and motion", "labels"]));
     let mut codes = Codes::of(source, &mut notes)?;

@@ -23,12 +23,12 @@ pub struct Wiring {
 
 impl Wiring {
     /// Of a board, whose antennas the radar's must be up to a shift; without one, transmitters and receivers are numbered
-    /// as they come.
+    /// as they come. `carries_antennas`: the layout holds their places itself.
     ///
     /// # Errors
     /// A board of another maker, antennas that the board has not, receivers in another order than its own, and chirps that
     /// do not fill the lanes.
-    pub fn of(radar: &Radar, board: Option<&Board>, notes: &mut Vec<String>) -> Result<Self> {
+    pub fn of(radar: &Radar, board: Option<&Board>, carries_antennas: bool, notes: &mut Vec<String>) -> Result<Self> {
         let lanes = lanes(radar.sampling, board)?;
         if radar.sampling == Sampling::Complex && !lanes.interleaved && !radar.samples_per_chirp.is_multiple_of(lanes.count) {
             let expected = format!("a multiple of {}: one sample for each lane", lanes.count);
@@ -43,7 +43,7 @@ impl Wiring {
                     let expected = "ascending numbers: the lanes carry receivers in the board's order";
                     return Err(Error::setting("radar.rx_m", format!("receivers {rx:?} of the {}", board.name), expected));
                 }
-                if [tx_shift, rx_shift].as_flattened().iter().any(|shift| shift.abs() > 1e-9) {
+                if !carries_antennas && [tx_shift, rx_shift].as_flattened().iter().any(|shift| shift.abs() > 1e-9) {
                     notes.push(format!(
                         "transmitters are {tx_shift:.4?} m and receivers {rx_shift:.4?} m from where --board {} puts them: only \
                          their places among each other come back",
@@ -55,10 +55,14 @@ impl Wiring {
             }
             None => {
                 let device = if radar.carrier_hz() > 70e9 { "awr1843" } else { "iwr6843" };
-                notes.push(format!(
-                    "no board was named: wired like an {device} (two lanes), with transmitters numbered in firing order; \
-                     antenna positions are not carried, give --set radar.tx_m and radar.rx_m to the import"
-                ));
+                let wired =
+                    format!("no board was named: wired like an {device} (two lanes), with transmitters numbered in firing order");
+                notes.push(match carries_antennas {
+                    true => wired,
+                    false => format!(
+                        "{wired}; antenna positions are not carried, give --set radar.tx_m and radar.rx_m to the import, and no --board"
+                    ),
+                });
                 let all = |count: usize| (0..count).collect::<Vec<_>>();
                 (all(radar.tx_m.len()), all(radar.rx_m.len()), vec![false; radar.rx_m.len()], device.to_string())
             }
@@ -75,8 +79,7 @@ impl Wiring {
     }
 }
 
-/// SWRA581B: four lanes with the receivers side by side on xWR12xx, xWR14xx and xWR22xx, two lanes with one receiver after
-/// the other on xWR16xx, xWR18xx and xWR68xx.
+/// Four lanes with the receivers side by side, or two lanes with one receiver after the other, as without a board.
 fn lanes(sampling: Sampling, board: Option<&Board>) -> Result<Lanes> {
     let chip = board.map_or("AWR1843", |board| board.name);
     if !["AWR", "IWR"].iter().any(|maker| chip.starts_with(maker)) {
@@ -85,13 +88,13 @@ fn lanes(sampling: Sampling, board: Option<&Board>) -> Result<Lanes> {
             hint: Some("a DCA1000 captures boards of one device of TI only; leave out --board, or export to npz".into()),
         });
     }
-    let interleaved = ["12", "14", "22"].contains(&&chip[3..5]);
+    let interleaved = board.is_some_and(Board::interleaves);
     Ok(Lanes { count: if interleaved { 4 } else { 2 }, interleaved, q_first: false, sampling })
 }
 
 fn other(key: &str, board: &Board) -> Error {
     Error::setting(format!("radar.{key}"), "another array", format!("antennas of the {} up to a shift", board.name))
-        .with_hint("name the board that was simulated, or leave out --board: antenna positions are then not carried")
+        .with_hint("name the board that was simulated, or leave out --board")
 }
 
 /// The board's numbers of these places, and how far they are from the board's own.
@@ -115,11 +118,13 @@ mod tests {
     fn the_firing_order_of_a_board_is_found_up_to_a_shift() {
         let mut notes = Vec::new();
         let board = Board::named("AWR1843").unwrap();
-        let wiring = Wiring::of(&Radar::mmmesh(1), Some(board), &mut notes).unwrap();
+        let wiring = Wiring::of(&Radar::mmmesh(1), Some(board), false, &mut notes).unwrap();
         assert_eq!((wiring.tx, wiring.rx, wiring.device.as_str()), (vec![0, 2, 1], vec![0, 1, 2, 3], "awr1843"));
         assert!(notes[0].contains("only their places among each other"), "{notes:?}");
         let one = Radar { tx_m: vec![[0.0; 3], [0.001, 0.0, 0.0]], ..Radar::mmmesh(1) };
-        assert!(Wiring::of(&one, Some(board), &mut notes).err().unwrap().to_string().contains("`radar.tx_m` is another array"));
+        assert!(
+            Wiring::of(&one, Some(board), false, &mut notes).err().unwrap().to_string().contains("`radar.tx_m` is another array")
+        );
     }
 
     #[test]
@@ -132,6 +137,6 @@ mod tests {
         }
         assert!(lanes(Sampling::Real, Some(Board::named("BGT60TR13C").unwrap())).is_err());
         let odd = Radar { samples_per_chirp: 85, ..Radar::mmmesh(1) };
-        assert!(Wiring::of(&odd, None, &mut vec![]).err().unwrap().to_string().contains("a multiple of 2"));
+        assert!(Wiring::of(&odd, None, false, &mut vec![]).err().unwrap().to_string().contains("a multiple of 2"));
     }
 }

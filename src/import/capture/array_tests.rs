@@ -173,6 +173,21 @@ fn a_folder_of_the_infineon_sdk_is_read() {
 }
 
 #[test]
+fn receivers_of_the_infineon_sdk_come_in_the_order_of_their_numbers() {
+    let folder = infineon(3, |place| place as f64);
+    let config = folder.path().join("RadarIfxAvian_00/config.json");
+    let text = fs::read_to_string(&config).unwrap();
+    let of = |list: &str| {
+        fs::write(&config, text.replace(r#""rx_antennas": [1, 3]"#, &format!(r#""rx_antennas": {list}"#))).unwrap();
+        open(&[folder.path().into()], &Stated::default()).unwrap()
+    };
+    let (plain, turned) = (of("[1, 3]"), of("[3, 1]"));
+    assert_eq!(plain.radar.rx_m, turned.radar.rx_m);
+    let is_said = |capture: &Capture| capture.notes.iter().any(|note| note.starts_with("receivers [3, 1] of "));
+    assert!(is_said(&turned) && !is_said(&plain), "{:?}", turned.notes);
+}
+
+#[test]
 fn fractions_of_full_scale_are_kept_and_codes_are_codes() {
     let noise = numbers(9, 3 * 2 * 2 * 8, -0.5, 0.5);
     let folder = infineon(3, |place| noise[place]);

@@ -10,7 +10,7 @@ use super::cube::{Cube, half_scale_note};
 use super::layout::{Axis, Layout};
 use super::radar_table::{finished, missing, place_antennas, radar_table, refuse_unknown, table_of};
 use super::words::{Lengths, WordArray};
-use super::{Capture, Stated, coloradar, numbers};
+use super::{Capture, Stated, coloradar, inverted, numbers};
 use crate::data::arrays::Kind;
 use crate::data::entries::entries;
 use crate::error::{Error, Result};
@@ -32,9 +32,11 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         }
     };
     let files = files(sources)?;
+    let missing = missing_files(&files);
     let mut notes: Vec<String> =
         preset.map(|preset| format!("laid out as {} ({})", preset.title, preset.page)).into_iter().collect();
     notes.extend(preset.iter().flat_map(|preset| preset.notes.clone()));
+    notes.extend(missing);
     let mut settings = Settings::of(stated, &layout, &mut notes)?;
     let number = layout.number.filter(|number| is_words(&files[0]) && number.kind != Kind::Int);
     if is_words(&files[0]) && number.is_none() {
@@ -60,6 +62,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     }
     settings.fill(&cube, &mut notes)?;
     let board = settings.board;
+    let inverted_rx = settings.inverted_rx(&cube, &mut notes);
     let one_frame = settings.finish(&mut notes)?;
     cube.check(&one_frame)?;
     notes.push(format!("{} files, in the order of the numbers in their names, are the frames", files.len()));
@@ -72,7 +75,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         let mut cube = opened(&files[index], &mut vec![])?;
         cube.wrapped = wrapped;
         cube.check(&one_frame)?;
-        cube.frame(0)
+        Ok(inverted::turned_back(cube.frame(0)?, &inverted_rx))
     };
     Ok(Capture { source, radar, layout: stored_as, board, notes, lost: vec![], rest: 0.0, frame: Box::new(frame) })
 }
@@ -80,6 +83,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
 fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) -> Result<Capture> {
     settings.fill(&cube, &mut notes)?;
     let board = settings.board;
+    let inverted_rx = settings.inverted_rx(&cube, &mut notes);
     let radar = settings.finish(&mut notes)?;
     cube.check(&radar)?;
     notes.extend(half_scale_note(&cube)?);
@@ -91,7 +95,7 @@ fn one(path: &Path, cube: Cube, mut settings: Settings, mut notes: Vec<String>) 
         notes,
         lost: vec![],
         rest: 0.0,
-        frame: Box::new(move |index| cube.frame(index)),
+        frame: Box::new(move |index| Ok(inverted::turned_back(cube.frame(index)?, &inverted_rx))),
     })
 }
 
@@ -143,6 +147,27 @@ fn numbered(name: &str) -> Vec<(String, u64)> {
     parts
 }
 
+/// By how much the one number counts on in which two names differ.
+fn step(pair: &[PathBuf]) -> Option<u64> {
+    let names = [&pair[0], &pair[1]].map(|file| numbered(&file.file_name().unwrap_or_default().to_string_lossy()));
+    let mut differing = names[0].iter().zip(&names[1]).filter(|(own, next)| own != next);
+    let ((text, own), (same, next)) = differing.next()?;
+    (names[0].len() == names[1].len() && differing.next().is_none() && text == same).then(|| next.checked_sub(*own))?
+}
+
+/// That files are missing, where most names count on by one.
+fn missing_files(files: &[PathBuf]) -> Option<String> {
+    let steps: Vec<u64> = files.windows(2).map(|pair| step(pair).unwrap_or(0)).collect();
+    let counts_on = 2 * steps.iter().filter(|step| **step == 1).count() > steps.len();
+    let first = steps.iter().position(|step| *step > 1).filter(|_| counts_on)?;
+    let missing: u64 = steps.iter().map(|step| step.saturating_sub(1)).sum();
+    Some(format!(
+        "{missing} numbers are missing in the names of the files, the first after {}: what was recorded there is not put in, and what \
+         follows comes too early",
+        files[first].display()
+    ))
+}
+
 /// What is stated of the radar, before the array fills what is left open.
 struct Settings {
     name: PathBuf,
@@ -155,6 +180,8 @@ struct Settings {
     is_by_chirp: bool,
     has_tx: bool,
     has_rx: bool,
+    /// Antennas that the board places, by their keys.
+    placed: Vec<&'static str>,
 }
 
 impl Settings {
@@ -190,6 +217,7 @@ impl Settings {
             is_by_chirp: has(&[Axis::Chirp, Axis::Antenna]),
             has_tx: has(&[Axis::Tx, Axis::Chirp, Axis::Antenna]),
             has_rx: has(&[Axis::Rx, Axis::Antenna]),
+            placed: vec![],
         })
     }
 
@@ -209,7 +237,21 @@ impl Settings {
                  are so many); --set radar.tx_m states others"
             ));
         }
-        place_antennas(self.radar(), board, &senders, rx.unwrap_or(board.rx_half_wavelengths.len()));
+        let placed = place_antennas(self.radar(), board, &senders, rx.unwrap_or(board.rx_half_wavelengths.len()));
+        self.placed.extend(placed);
+    }
+
+    /// Receivers whose samples are to be turned back: of words, which are as the board sent them, and of an array whose receivers the
+    /// board places. Of an array nothing says whether its maker turned them back, so that the note says how to keep them.
+    fn inverted_rx(&mut self, cube: &Cube, notes: &mut Vec<String>) -> Vec<usize> {
+        let Some(board) = self.board.filter(|_| cube.holds_words() || self.placed.contains(&"rx_m")) else { return vec![] };
+        let inverted = inverted::places(board, 0..self.antennas("rx_m").unwrap_or(0));
+        notes.extend(if cube.holds_words() {
+            inverted::note(&inverted)
+        } else {
+            inverted::note_of_array(&inverted, board, &self.placed)
+        });
+        inverted
     }
 
     fn antennas(&mut self, key: &str) -> Option<usize> {
@@ -300,12 +342,27 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
-    use super::numbered;
+    use std::path::PathBuf;
+
+    use super::{missing_files, numbered};
 
     #[test]
     fn names_are_in_the_order_of_their_numbers() {
         let mut names = ["frame_10.bin", "frame_9.bin", "frame_0.bin", "a.bin"];
         names.sort_by_cached_key(|name| numbered(name));
         assert_eq!(names, ["a.bin", "frame_0.bin", "frame_9.bin", "frame_10.bin"]);
+    }
+
+    #[test]
+    fn missing_numbers_are_said_of_names_that_count_on() {
+        let note = |names: &[String]| missing_files(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
+        let frames = |numbers: &[u64]| numbers.iter().map(|number| format!("s2/frame_{number}.bin")).collect::<Vec<_>>();
+        let said = note(&frames(&[0, 1, 2, 3, 4, 6, 7, 8, 11])).unwrap();
+        assert!(said.starts_with("3 numbers are missing in the names of the files, the first after s2/frame_4.bin: "), "{said}");
+        assert_eq!(note(&frames(&[0, 1, 2, 3])), None);
+        // Times, and names that differ otherwise.
+        assert_eq!(note(&frames(&[100, 133, 167, 168, 200])), None);
+        assert_eq!(note(&["a_1.bin", "b_3.bin", "b_4.bin"].map(String::from)), None);
+        assert_eq!(note(&["a_1_2.bin".into(), "a_2_1.bin".into()]), None);
     }
 }

@@ -158,3 +158,62 @@ fn the_profiles_of_a_frame_are_listed() {
     let error = profiles(&[array], &isk()).unwrap_err();
     assert!(error.to_string().contains("no description with chirp profiles") && error.hint().is_some(), "{error}");
 }
+
+/// Whatever way a board's raw samples come in, its inverted receivers are turned back; of an array the note says how to keep them.
+#[test]
+fn inverted_receivers_are_turned_back_under_a_layout_as_without_one() {
+    let lengths = [format!("radar.samples_per_chirp={SAMPLES}"), format!("radar.loops_per_frame={LOOPS}")];
+    let sets: Vec<String> = settings().into_iter().chain(lengths).map(|set| set.replace("=77e9", "=60e9")).collect();
+    let layout = |text: &str| Some(Layout::parse(text).unwrap());
+    let (folder, bin) = capture_folder(&two_lane_words(), "a.mmwave.json", &mmwave_json());
+    let cube = folder.path().join("cube.npy");
+    let frame_files: Vec<PathBuf> = (0..FRAMES).map(|frame| folder.path().join(format!("frame_{frame}.npy"))).collect();
+    let mut codes = Vec::new();
+    for place in (0..FRAMES * LOOPS * TX * RX * SAMPLES).map(|at| {
+        let (rest, sample) = (at / SAMPLES, at % SAMPLES);
+        let (rest, rx) = (rest / RX, rest % RX);
+        [rest / TX / LOOPS, rest / TX % LOOPS, rest % TX, rx, sample]
+    }) {
+        codes.extend(code(place));
+    }
+    write_npy(&cube, &[FRAMES, LOOPS, TX, RX, SAMPLES, 2], Values::I16(&codes)).unwrap();
+    for (path, own) in frame_files.iter().zip(codes.chunks(codes.len() / FRAMES)) {
+        write_npy(path, &[LOOPS, TX, RX, SAMPLES, 2], Values::I16(own)).unwrap();
+    }
+    for (board, inverted) in [("IWR6843AOP", [0, 2]), ("IWR6843ODS", [1, 2])] {
+        let wanted = |place: [usize; 5]| if inverted.contains(&place[3]) { code(place).map(|part| -part) } else { code(place) };
+        let said = format!("receivers {inverted:?} are fed from the opposite side: their samples are negated");
+        let mut by_json = open(std::slice::from_ref(&bin), &on(board)).unwrap();
+        assert!(by_json.notes.contains(&said), "{:?}", by_json.notes);
+        assert_frames(&mut by_json, wanted);
+        let stated = |text: &str| Stated { sets: sets.clone(), layout: layout(text), ..on(board) };
+        let mut words = open(std::slice::from_ref(&bin), &stated("frame loop tx rx sample iq lane")).unwrap();
+        assert!(words.notes.contains(&said), "{:?}", words.notes);
+        assert_frames(&mut words, wanted);
+        let whole = stated("frame loop tx rx sample iq");
+        for (sources, stated) in [(vec![cube.clone()], whole), (frame_files.clone(), stated("loop tx rx sample iq"))] {
+            let mut array = open(&sources, &stated).unwrap();
+            let note = array.notes.iter().find(|note| note.starts_with(&said)).unwrap();
+            assert!(note.ends_with("without --board: give --set radar.tx_m=[…] and --set radar.rx_m=[…] instead"), "{note}");
+            assert_frames(&mut array, wanted);
+        }
+    }
+    // As the note says.
+    let row = |count: usize| (0..count).map(|at| format!("[{at}e-3, 0.0, 0.0]")).collect::<Vec<_>>().join(", ");
+    let antennas = [("tx_m", TX), ("rx_m", RX)].map(|(key, count)| format!("radar.{key}=[{}]", row(count)));
+    let sets = sets.into_iter().chain(antennas).collect();
+    assert_frames(
+        &mut open(&[cube], &Stated { sets, layout: layout("frame loop tx rx sample iq"), ..Stated::default() }).unwrap(),
+        code,
+    );
+}
+
+#[test]
+fn receivers_one_after_the_other_on_a_board_that_sends_them_side_by_side_are_said() {
+    let (_folder, bin) = capture_folder(&two_lane_words(), "a.cfg", &CFG.replace("profileCfg 0 60", "profileCfg 0 77"));
+    let is_said = |board: &str| {
+        let notes = open(std::slice::from_ref(&bin), &on(board)).unwrap().notes;
+        notes.iter().any(|note| note.contains("sends its receivers side by side (SWRA581B), but"))
+    };
+    assert!(is_said("IWR1443BOOST") && !is_said("AWR1843"));
+}

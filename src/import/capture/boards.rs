@@ -176,6 +176,13 @@ impl Board {
         Ok(())
     }
 
+    /// Whether it sends the samples of all receivers side by side on four lanes, as xWR12xx, xWR14xx and xWR22xx do (SWRA581B); TI's others
+    /// send one receiver after the other on two.
+    pub fn interleaves(&self) -> bool {
+        let is_of_ti = ["AWR", "IWR"].iter().any(|maker| self.name.starts_with(maker));
+        is_of_ti && self.name.get(3..5).is_some_and(|line| ["12", "14", "22"].contains(&line))
+    }
+
     fn half_m(&self) -> f64 {
         SPEED_OF_LIGHT / self.design_frequency_hz / 2.0
     }

@@ -38,7 +38,7 @@ impl Index {
         let name = data.file_name().unwrap_or_default().to_string_lossy().replace("_data.bin", "_idx.bin");
         let index = data.with_file_name(name);
         if !index.is_file() {
-            let length = 2 * Words::open(&[data.into()])?.len();
+            let length = Words::open(&[data.into()])?.bytes();
             let (frames, rest) = (length / frame_bytes, length % frame_bytes);
             notes.push(format!("{}: no {}: all {frames} whole frames are taken", data.display(), index.display()));
             if rest > 0 {
@@ -83,7 +83,7 @@ impl Index {
 
     /// The samples must be there; files are made before the capture, so that there may be more.
     fn hold_against_samples(&self, index: &Path, whole: u64, notes: &mut Vec<String>) -> Result<()> {
-        let length = if whole == 0 { 0 } else { 2 * Words::open(std::slice::from_ref(&self.data))?.len() };
+        let length = if whole == 0 { 0 } else { Words::open(std::slice::from_ref(&self.data))?.bytes() };
         if length < whole {
             let expected = format!("{whole} bytes: the {} frames of {}", self.frames, index.display());
             return Err(Error::field(&self.data, "samples", format!("{length} bytes"), expected)

@@ -108,6 +108,11 @@ impl Cube {
         if complex { Sampling::Complex } else { Sampling::Real }
     }
 
+    /// Whether it is words as a capture card leaves them.
+    pub fn holds_words(&self) -> bool {
+        matches!(&self.numbers, Numbers::Words(_))
+    }
+
     pub fn holds_floats(&self) -> bool {
         matches!(&self.numbers, Numbers::Array(source) if source.number().0 == Kind::Float)
     }

@@ -7,7 +7,7 @@ use super::descriptions::descriptions;
 use super::radar_table::apply;
 use super::schedule::{Selection, TiRadar};
 use super::stream::Words;
-use super::{Capture, Stated, cascade, lanes::Lanes, parts, ti_cfg, ti_json};
+use super::{Capture, Stated, cascade, inverted, lanes::Lanes, parts, ti_cfg, ti_json};
 use crate::data::{IfFrame, IfLayout, files};
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
@@ -35,6 +35,14 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let shaped = apply(found, &std::mem::take(&mut stated.sets))?;
     let board = stated.board.as_deref().map(Board::named).transpose()?;
     let lanes = radar.lanes;
+    notes.extend(board.filter(|board| board.interleaves() && !lanes.interleaved).map(|board| {
+        format!(
+            "the {} sends its receivers side by side (SWRA581B), but {} says one after the other: samples are read as it says; if it is \
+             wrong, set chInterleave to 0 there (in a .cfg the last but one number of adcbufCfg)",
+            board.name,
+            config.display()
+        )
+    }));
     let [_, n_tx, n_rx, loops, samples] = shaped.dims();
     // Of one frame all of which is kept: then its loops are those of the description.
     let of_kept = (n_tx * n_rx * loops * samples * if lanes.sampling == Sampling::Complex { 2 } else { 1 }) as u64;
@@ -42,7 +50,7 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
     let rest = if is_alone { (words.len() % words_per_frame) as f64 / words_per_frame as f64 } else { 0.0 };
     let frame = move |index: usize| {
         let words = words.read(index as u64 * words_per_frame, words_per_frame as usize)?;
-        Ok(arrange(&words, &starts, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
+        Ok(inverted::turned_back(arrange(&words, &starts, lanes, [n_tx, n_rx, loops, samples]), &inverted_rx))
     };
     let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
     Ok(Capture { source: sources[0].clone(), radar: shaped, layout, board, notes, lost: vec![], rest, frame: Box::new(frame) })
@@ -95,19 +103,18 @@ fn read(config: &Path) -> Result<TiRadar> {
 }
 
 /// The words of a frame as `[tx, rx, loop, sample]`.
-fn arrange(words: &[i16], starts: &[Vec<u64>], lanes: Lanes, dims: [usize; 4], inverted_rx: &[usize]) -> IfFrame {
+fn arrange(words: &[i16], starts: &[Vec<u64>], lanes: Lanes, dims: [usize; 4]) -> IfFrame {
     let [n_tx, n_rx, loops, samples] = dims;
     let count = n_tx * n_rx * loops * samples;
     let (mut re, mut im) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for tx in 0..n_tx {
         for rx in 0..n_rx {
-            let sign = if inverted_rx.contains(&rx) { -1.0 } else { 1.0 };
             for chirp in starts.iter().take(loops).map(|starts| starts[tx] as usize) {
                 for sample in 0..samples {
                     let (i, q) = lanes.place(rx, n_rx, sample, samples);
-                    re.push(sign * f32::from(words[chirp + i]));
+                    re.push(f32::from(words[chirp + i]));
                     if lanes.sampling == Sampling::Complex {
-                        im.push(sign * f32::from(words[chirp + q]));
+                        im.push(f32::from(words[chirp + q]));
                     }
                 }
             }

@@ -74,7 +74,7 @@ mod tests {
         TiRadar {
             file: "radar.cfg".into(),
             profiles: vec![profile],
-            bursts: vec![Burst { chirps: vec![Chirp { profile: 0, tx_mask: 1, extra_idle_s: 0.0 }], loops }],
+            bursts: vec![Burst::of(vec![Chirp { profile: 0, tx_mask: 1, extra_idle_s: 0.0 }], loops, 1, 0.0)],
             frame_period_s: 0.1,
             frames: None,
             rx_mask,

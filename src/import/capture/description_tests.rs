@@ -1,8 +1,9 @@
-//! What descriptions of TI's radars say that is not read: phases of transmitters, times below zero, texts of another encoding.
+//! What descriptions of TI's radars say beside the usual: bursts, forced profiles, entries that replace others, logs, and what is not read
+//! (phases of transmitters, times below zero, texts of another encoding, commands of other SDKs).
 
 use std::path::Path;
 
-use super::tests::{CFG, capture_folder, mmwave_json, two_lane_words};
+use super::tests::{CFG, FRAMES, RX, SAMPLES, TX, assert_frames, capture_folder, code, mmwave_json, two_lane_words};
 use super::{Capture, Layout, Stated, open};
 use crate::error::Result;
 
@@ -91,5 +92,154 @@ fn a_description_of_a_capture_card_describes_no_array() {
             open(&[bin], &Stated { configs: vec![folder.path().join(config)], layout, ..Stated::default() }).err().unwrap();
         assert!(error.to_string().contains("expected TOML with [radar]"), "{error}");
         assert!(error.hint().unwrap().contains("leave --layout out"), "{:?}", error.hint());
+    }
+}
+
+/// The description of a frame of `bursts` bursts, one each `period_ms`, of so many loops: as a `.cfg` and as JSON.
+fn in_bursts(loops: usize, bursts: usize, period_ms: f64) -> [(&'static str, String); 2] {
+    let subframe = format!("advFrameCfg 1 0 2 1 0\nsubFrameCfg 0 0 0 3 {loops} {period_ms} 0 1 {bursts} 50\n");
+    let cfg = CFG.replace("frameCfg 0 2 4 2 50 1 0\n", &subframe);
+    [
+        ("a.cfg", cfg),
+        (
+            "a.mmwave.json",
+            advanced_json(
+                0,
+                &format!(r#""numLoops": {loops}, "numOfBurstLoops": {bursts}, "burstPeriodicity_msec": {period_ms}"#),
+            ),
+        ),
+    ]
+}
+
+/// An advanced frame of one subframe.
+fn advanced_json(forced: usize, settings: &str) -> String {
+    let advanced = format!(
+        r#""rlAdvFrameCfg_t": {{"frameSeq": {{"numOfSubFrames": 1, "forceProfile": {forced}, "numFrames": 2, "subFrameCfg": [
+        {{"rlSubFrameCfg_t": {{"chirpStartIdx": 0, "numOfChirps": 3, "numOfBurst": 1, "subFramePeriodicity_msec": 50.0, {settings}}}}}]}}}},
+        "rlFrameCfg_t""#
+    );
+    mmwave_json().replacen("legacyFrameChirp", "advancedFrameChirp", 1).replacen(r#""rlFrameCfg_t""#, &advanced, 1)
+}
+
+/// A loop of three chirps takes 150 us.
+#[test]
+fn loops_that_pause_between_bursts_are_refused_and_others_are_read() {
+    for (config, text) in in_bursts(2, 2, 0.3) {
+        let mut capture = opened(config, &text).unwrap();
+        assert_eq!(capture.radar.dims(), [FRAMES, TX, RX, 4, SAMPLES], "{config}");
+        assert!((capture.radar.chirp_period_s - 50e-6).abs() < 1e-12 && (capture.radar.frame_period_s - 0.05).abs() < 1e-12);
+        assert_frames(&mut capture, code);
+    }
+    for (config, text) in [in_bursts(2, 2, 5.0), in_bursts(2, 2, 0.30002), in_bursts(2, 2, 0.2)].concat() {
+        let error = opened(config, &text).err().unwrap();
+        assert!(error.to_string().contains("`burst period` is "), "{error}");
+        assert!(
+            error.to_string().ends_with("expected 300.000 us, as long as its 2 loops last, or one burst a subframe"),
+            "{error}"
+        );
+        assert!(error.hint().unwrap().contains("pause between bursts"), "{error}");
+    }
+    // One burst is one train, whatever its period; bursts of one loop are as far apart as their period says.
+    for (config, text) in in_bursts(4, 1, 7.0) {
+        assert!((opened(config, &text).unwrap().radar.chirp_period_s - 50e-6).abs() < 1e-12);
+    }
+    for (config, text) in in_bursts(1, 4, 5.0) {
+        let error = opened(config, &text).err().unwrap();
+        assert!(error.to_string().contains("even steps") && error.hint().unwrap().contains("--tx 0"), "{error}");
+        let (_folder, bin) = capture_folder(&two_lane_words(), config, &text);
+        let capture = open(&[bin], &Stated { board: Some("IWR6843ISK".into()), tx: Some(0), ..Stated::default() }).unwrap();
+        assert_eq!((capture.radar.loops_per_frame, capture.radar.chirp_period_s), (4, 5e-3), "{config}");
+    }
+}
+
+#[test]
+fn a_forced_profile_is_that_of_the_chirps() {
+    let second = "profileCfg 1 61 30 6 20 0 0 50 1 8 1000 0 0 30\n";
+    let cfg = |forced: usize| {
+        let frame = format!("{second}advFrameCfg 1 {forced} 2 1 0\nsubFrameCfg 0 1 0 3 4 10 0 1 1 50\n");
+        CFG.replace("frameCfg 0 2 4 2 50 1 0\n", &frame)
+    };
+    let json = |forced: usize| {
+        let text = advanced_json(forced, r#""numLoops": 4, "forceProfileIdx": 1"#);
+        let start = text.find(r#"{"rlProfileCfg_t""#).unwrap();
+        let end = start + text[start..].find("}}").unwrap() + 2;
+        let other = text[start..end].replace(r#""profileId": 0"#, r#""profileId": 1"#).replace("60.0000000044704", "61.0");
+        format!("{}, {other}{}", &text[..end], &text[end..])
+    };
+    for (config, texts) in [("a.cfg", [cfg(0), cfg(1)]), ("a.mmwave.json", [json(0), json(1)])] {
+        let [own, forced] = texts.map(|text| opened(config, &text).unwrap().radar.start_frequency_hz);
+        assert_eq!((own, forced), (60e9, 61e9), "{config}");
+    }
+    for (config, text, part) in
+        [("a.cfg", cfg(2), "advFrameCfg` is 2 at place 2"), ("a.mmwave.json", json(2), "frameSeq.forceProfile` is 2")]
+    {
+        let error = opened(config, &text).err().unwrap().to_string();
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+/// As the radar is sent them; what only fills the tool's list replaces nothing.
+#[test]
+fn a_later_chirp_or_profile_of_a_description_takes_the_place_of_an_earlier_one() {
+    let chirp = |index: usize, mask: usize| {
+        format!(
+            r#"{{"rlChirpCfg_t": {{"chirpStartIdx": {index}, "chirpEndIdx": {index}, "profileId": 0, "txEnable": "0x{mask:X}"}}}}"#
+        )
+    };
+    let with = |later: &[String]| {
+        let text = mmwave_json();
+        let end = text.find("],\n        \"rlFrameCfg_t\"").unwrap();
+        format!("{}, {}{}", &text[..end], later.join(", "), &text[end..])
+    };
+    let tx_m = |text: &str| opened("a.mmwave.json", text).unwrap().radar.tx_m;
+    let whole = tx_m(&mmwave_json());
+    assert_eq!(tx_m(&with(&[chirp(1, 4), chirp(2, 2)])), [whole[0], whole[2], whole[1]]);
+    assert_eq!(tx_m(&with(&[chirp(0, 0), chirp(0, 0)])), whole);
+    let text = mmwave_json();
+    let start = text.find(r#"{"rlProfileCfg_t""#).unwrap();
+    let end = start + text[start..].find("}}").unwrap() + 2;
+    let again = |from: &str, to: &str| format!("{}, {}{}", &text[..end], text[start..end].replace(from, to), &text[end..]);
+    let start_hz = |text: &str| opened("a.mmwave.json", text).unwrap().radar.start_frequency_hz;
+    assert_eq!(start_hz(&again("60.0000000044704", "61.0")), 61e9);
+    assert_eq!(start_hz(&again(r#""numAdcSamples": 8"#, r#""numAdcSamples": 0"#)), 60e9);
+}
+
+#[test]
+fn a_log_of_commands_is_read_from_its_last_flush_on_and_without_its_prompts() {
+    let advanced =
+        "advFrameCfg 2 0 2 1 0\nsubFrameCfg 0 0 0 3 2 10 0 1 1 25\nsubFrameCfg 1 0 0 3 2 10 0 1 1 25\nbpmCfg -1 1 0 1\n";
+    let old = format!("{advanced}chirpCfg 3 3 0 0 0 0 0 4\n");
+    let prompted: String = CFG.trim().lines().map(|line| format!("mmwDemo:/>{line}\nDone\n")).collect();
+    let log = format!("{}{old}flushCfg\n{prompted}", CFG.replace("% a comment", ""));
+    let mut capture = opened("a.cfg", &log).unwrap();
+    assert_eq!(capture.radar.dims(), [FRAMES, TX, RX, 4, SAMPLES]);
+    assert_frames(&mut capture, code);
+    // What the flush cleared is missing, and what it leaves is not.
+    let buffer = "adcbufCfg -1 0 0 1 1\n";
+    opened("a.cfg", &format!("{buffer}flushCfg{}", CFG.replace(buffer, ""))).unwrap();
+    let error = opened("a.cfg", &format!("{CFG}flushCfg\n")).err().unwrap();
+    assert!(error.to_string().ends_with("`frameCfg` is missing, expected a line of that command"), "{error}");
+}
+
+#[test]
+fn the_period_of_a_frame_of_the_mcu_plus_sdk_follows_its_samples() {
+    let capture = opened("a.cfg", &CFG.replace("frameCfg 0 2 4 2 50 1 0", "frameCfg 0 2 4 2 16 50 1 0")).unwrap();
+    assert!((capture.radar.frame_period_s - 0.05).abs() < 1e-12, "{}", capture.radar.frame_period_s);
+}
+
+#[test]
+fn commands_of_what_is_not_read_are_refused_by_name() {
+    let low_power = "sensorStop 0\nchannelCfg 7 3 0\nchirpComnCfg 19 0 0 128 4 40 0\nchirpTimingCfg 6 28 0 70 59.75\nframeCfg 8 0 250 64 100 0\n";
+    for (text, part, hint) in [
+        (low_power.to_string(), "`line 3: chirpComnCfg` is a command of the MMWAVE-L SDK", "--layout"),
+        (format!("{CFG}ddmPhaseShiftAntOrder 0 2 3 1\n"), "ddmPhaseShiftAntOrder` is transmitters that send together", "Doppler"),
+        (
+            format!("{CFG}bpmCfg -1 1 0 1\n"),
+            "bpmCfg` is transmitters that send together with switched phases",
+            "sums and differences",
+        ),
+    ] {
+        let error = opened("a.cfg", &text).err().unwrap();
+        assert!(error.to_string().contains(part) && error.hint().unwrap().contains(hint), "{error}");
     }
 }

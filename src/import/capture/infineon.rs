@@ -27,7 +27,12 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let folder = device_folder(folder)?;
     let mut notes = Vec::new();
     let config = Json::read(&stated.configs.first().cloned().unwrap_or_else(|| folder.join("config.json")))?;
-    let shape = Shape::of(&config)?;
+    let mut shape = Shape::of(&config)?;
+    if !shape.rx.is_sorted() {
+        // The SDK makes a mask of the list.
+        notes.push(format!("receivers {:?} of {} come in the order of their numbers", shape.rx, config.file().display()));
+        shape.rx.sort_unstable();
+    }
     let tx = chosen(&config, &shape, stated)?;
     let board = board(stated, description(&folder)?.as_deref(), &mut notes)?;
     let source = folder.join(SAMPLES);

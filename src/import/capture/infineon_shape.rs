@@ -53,7 +53,10 @@ fn of_single(shape: &Json) -> Result<Shape> {
     // Earlier releases of the SDK wrote the ends of the band; their chirps rise.
     let either =
         |key: &str, earlier: &str| number(if shape.find(key).is_none() && shape.find(earlier).is_some() { earlier } else { key });
-    let antennas = |key: &str| shape.get(key)?.items()?.iter().map(antenna).collect::<Result<Vec<usize>>>();
+    let antennas = |key: &str| match shape.get(key)? {
+        one if one.number().is_ok() => Ok(vec![antenna(&one)?]),
+        several => several.items()?.iter().map(antenna).collect::<Result<Vec<usize>>>(),
+    };
     let tx = if is_tdm(shape)? { vec![1, 2] } else { antennas("tx_antennas")? };
     if tx.len() > 1 && !is_tdm(shape)? {
         return Err(shape.get("tx_antennas")?.wrong("one transmitter, or mimo_mode \"tdm\""));
@@ -191,6 +194,14 @@ mod tests {
         assert_eq!(two, Shape { tx: vec![1, 2], ..shape });
         assert_eq!(read(&sequence(&[chirp("62e9", 1), chirp("62e9", 2)].join(","))).unwrap(), two);
         assert_eq!(read(&single(r#""tx_antennas": [1, 2], "mimo_mode": 1"#)).unwrap(), two);
+    }
+
+    #[test]
+    fn one_antenna_may_stand_without_a_list() {
+        let shape = read(&single(r#""tx_antennas": 1"#).replace("[1, 3]", "3")).unwrap();
+        assert_eq!((shape.tx, shape.rx), (vec![1], vec![3]));
+        assert!(read(&single(r#""tx_antennas": [1]"#).replace("[1, 3]", "0")).is_err());
+        assert!(read(&single(r#""tx_antennas": [1]"#).replace("[1, 3]", "true")).is_err());
     }
 
     #[test]

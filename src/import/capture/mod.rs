@@ -18,6 +18,7 @@ mod described;
 mod descriptions;
 mod infineon;
 mod infineon_shape;
+mod inverted;
 mod json;
 pub mod lanes;
 mod layout;
@@ -48,6 +49,7 @@ use crate::radar::Radar;
 use boards::Board;
 pub use layout::Layout;
 pub use presets::Preset;
+pub use rover_radar::INVERTED_RX;
 
 /// What a user says of a capture besides its files.
 #[derive(Clone, Debug, Default)]

@@ -51,13 +51,23 @@ pub fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
     in_order(&found)
 }
 
-/// That a file alone is one of several.
+/// That files are not all of their capture: others lie beside them, or the first ones are missing.
 pub fn note_of_others(sources: &[PathBuf]) -> Option<String> {
-    let [only] = sources else { return None };
-    let (name, number) = part(only)?;
+    let (first, last) = (sources.first()?, sources.last()?);
+    let ((name, number), (_, end)) = (part(first)?, part(last)?);
     let beside = |number: usize| PathBuf::from(format!("{}{number}.bin", name.display()));
-    let others = [number.checked_sub(1), Some(number + 1)].into_iter().flatten().map(beside).find(|path| path.is_file())?;
-    Some(format!("{} is of the same capture and was not named: only {} is read", others.display(), only.display()))
+    let before = number.checked_sub(1).map(beside);
+    if let Some(other) = before.iter().chain([&beside(end + 1)]).find(|path| path.is_file()) {
+        let read = sources.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        return Some(format!("{} is of the same capture and was not named: only {read} is read", other.display()));
+    }
+    before.map(|before| {
+        format!(
+            "{} is not there, and the capture began before {}: whether its first word begins a frame is not known",
+            before.display(),
+            first.display()
+        )
+    })
 }
 
 #[cfg(test)]
@@ -88,8 +98,24 @@ mod tests {
             std::fs::write(at(name), "ab").unwrap();
         }
         assert_eq!(in_folder(folder.path()).unwrap(), [at("x_Raw_0.bin"), at("x_Raw_1.bin")]);
-        assert!(note_of_others(&[at("x_Raw_0.bin")]).unwrap().contains("x_Raw_1.bin"));
+        assert!(note_of_others(&[at("x_Raw_0.bin")]).unwrap().contains("x_Raw_1.bin is of the same capture"));
+        assert!(note_of_others(&[at("x_Raw_1.bin")]).unwrap().contains("x_Raw_0.bin is of the same capture"));
+        assert_eq!(note_of_others(&[at("x_Raw_0.bin"), at("x_Raw_1.bin")]), None);
+        assert_eq!(note_of_others(&[at("z.bin")]), None);
         std::fs::write(at("y.bin"), "ab").unwrap();
         assert!(in_folder(folder.path()).unwrap_err().to_string().contains("3 files of samples"));
+    }
+
+    #[test]
+    fn parts_without_the_first_one_are_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["x_Raw_1.bin", "x_Raw_2.bin"] {
+            std::fs::write(at(name), "ab").unwrap();
+        }
+        let note = note_of_others(&in_folder(folder.path()).unwrap()).unwrap();
+        assert!(note.starts_with(&format!("{} is not there", at("x_Raw_0.bin").display())), "{note}");
+        std::fs::remove_file(at("x_Raw_2.bin")).unwrap();
+        assert_eq!(note_of_others(&[at("x_Raw_1.bin")]).unwrap(), note);
     }
 }

@@ -10,6 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use super::boards::Board;
+use super::inverted;
 use super::json::Json;
 use super::lanes::Lanes;
 use super::rover_radar::{Frames, radar_of};
@@ -82,7 +83,7 @@ pub fn open(folder: &Path, stated: &Stated) -> Result<Capture> {
     let [_, n_tx, n_rx, loops, samples] = radar.dims();
     let frame = move |index: usize| {
         let words = words.read(index as u64 * block, block as usize)?;
-        Ok(arrange(&words, lanes, [n_tx, n_rx, loops, samples], &inverted_rx))
+        Ok(inverted::turned_back(arrange(&words, lanes, [n_tx, n_rx, loops, samples]), &inverted_rx))
     };
     let layout = if lanes.sampling == Sampling::Complex { IfLayout::Codes } else { IfLayout::RealCodes };
     let board = stated.board.as_deref().map(Board::named).transpose()?;
@@ -135,10 +136,10 @@ fn shape_of(meta: &Json) -> Result<[usize; 4]> {
 
 /// How many frames there are.
 fn whole_frames(words: &Words, block: u64, shape: [usize; 4], meta: &Path) -> Result<usize> {
-    if !words.len().is_multiple_of(block) {
-        let bytes = block.saturating_mul(2);
+    let bytes = block.saturating_mul(2);
+    if !words.bytes().is_multiple_of(bytes) {
         let expected = format!("whole frames of {bytes} bytes: `iq.shape` is {shape:?} in {}", meta.display());
-        return Err(Error::field(words.first(), "samples", format!("{} bytes", 2 * words.len()), expected).with_hint(
+        return Err(Error::field(words.first(), "samples", format!("{} bytes", words.bytes()), expected).with_hint(
             "the file is cut off: copy it again; of a capture that broke off, cut iq, ts and valid after the last whole frame",
         ));
     }
@@ -183,7 +184,7 @@ fn times(sensor: &Path, meta: &Json, frames: usize) -> Result<Vec<f64>> {
 }
 
 /// The words of a frame as `[tx, rx, loop, sample]`.
-fn arrange(words: &[i16], lanes: Lanes, dims: [usize; 4], inverted_rx: &[usize]) -> IfFrame {
+fn arrange(words: &[i16], lanes: Lanes, dims: [usize; 4]) -> IfFrame {
     let [n_tx, n_rx, loops, samples] = dims;
     let chirp = lanes.words_per_chirp(n_rx, samples);
     let is_complex = lanes.sampling == Sampling::Complex;
@@ -191,13 +192,12 @@ fn arrange(words: &[i16], lanes: Lanes, dims: [usize; 4], inverted_rx: &[usize])
     let (mut re, mut im) = (Vec::with_capacity(count), Vec::with_capacity(if is_complex { count } else { 0 }));
     for tx in 0..n_tx {
         for rx in 0..n_rx {
-            let sign = if inverted_rx.contains(&rx) { -1.0 } else { 1.0 };
             for start in (0..loops).map(|index| (index * n_tx + tx) * chirp) {
                 for sample in 0..samples {
                     let (i, q) = lanes.place(rx, n_rx, sample, samples);
-                    re.push(sign * f32::from(words[start + i]));
+                    re.push(f32::from(words[start + i]));
                     if is_complex {
-                        im.push(sign * f32::from(words[start + q]));
+                        im.push(f32::from(words[start + q]));
                     }
                 }
             }

@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::Stated;
 use super::boards::Board;
 use super::json::Json;
 use super::radar_table::{finished, hold_frames, missing, place_antennas, radar_table, table_of};
 use super::time_stamps::Grid;
+use super::{Stated, inverted};
 use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::{Radar, SPEED_OF_LIGHT, Sampling};
@@ -22,6 +22,8 @@ use crate::radar::{Radar, SPEED_OF_LIGHT, Sampling};
 /// by rounding alone, at most that of single precision.
 const RESOLUTION_SHARE: f64 = f32::EPSILON as f64;
 const PERIOD: &str = "frame_period_s";
+/// In the `config.yaml` of `hybridsim export`: places of the receivers whose samples in `iq` are turned by half a turn.
+pub const INVERTED_RX: &str = "inverted_rx";
 
 /// What the channels say.
 pub struct Frames<'a> {
@@ -34,7 +36,7 @@ pub struct Frames<'a> {
     pub grid: Option<&'a Grid>,
 }
 
-/// The radar, and the receivers whose samples its board turns by half a turn.
+/// The radar, and the receivers whose samples are turned by half a turn: as the trace says, or by the board.
 ///
 /// # Errors
 /// Settings that are missing, or that contradict the channels or `radar.json`.
@@ -57,7 +59,7 @@ pub fn radar_of(sensor: &Path, found: &Frames, stated: &Stated, notes: &mut Vec<
     let radar = radar_table(&mut table)?;
     // Of a trace that broke off, `config.yaml` counts more than there are.
     radar.entry("frames").or_insert(Value::Integer(found.frames as i64));
-    fill_from_config(radar, &config, sensor, notes)?;
+    let carried = fill_from_config(radar, &config, sensor, notes)?;
     if let Some(intrinsics) = &intrinsics {
         fill_from_properties(radar, &properties_of(intrinsics)?);
     }
@@ -65,6 +67,7 @@ pub fn radar_of(sensor: &Path, found: &Frames, stated: &Stated, notes: &mut Vec<
     let board = stated.board.as_ref().map(|name| Board::named(name)).transpose()?;
     let [_, tx, rx, _] = found.shape;
     match board {
+        None if carried.is_some() => {}
         None => notes.push("no board was named: no receiver is taken to be fed from the opposite side".into()),
         Some(board) => notes.extend(place_antennas(radar, board, &board.senders(tx), rx).into_iter().map(|key| {
             let (what, name, source) = (if key == "tx_m" { "transmitters" } else { "receivers" }, board.name, board.source);
@@ -80,7 +83,13 @@ pub fn radar_of(sensor: &Path, found: &Frames, stated: &Stated, notes: &mut Vec<
     if let Some(intrinsics) = &intrinsics {
         hold_against_intrinsics(&radar, intrinsics)?;
     }
-    Ok((radar, board.map_or(vec![], |board| board.inverted_rx.to_vec())))
+    let is_carried = carried.is_some();
+    let inverted_rx = carried.or_else(|| Some(inverted::places(board?, 0..rx))).unwrap_or_default();
+    notes.extend(inverted::note(&inverted_rx).map(|note| match is_carried {
+        true => format!("{note}, as {} says, whatever the board", config.display()),
+        false => note,
+    }));
+    Ok((radar, inverted_rx))
 }
 
 fn float(table: &Table, key: &str) -> Option<f64> {
@@ -88,10 +97,11 @@ fn float(table: &Table, key: &str) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 
-/// `config.yaml` of the trace: that of `hybridsim export` holds the radar itself, that of a rover its properties.
-fn fill_from_config(radar: &mut Table, config: &Path, sensor: &Path, notes: &mut Vec<String>) -> Result<()> {
+/// `config.yaml` of the trace: that of `hybridsim export` holds the radar itself, that of a rover its properties. Which receivers' samples
+/// are turned by half a turn, where it says so.
+fn fill_from_config(radar: &mut Table, config: &Path, sensor: &Path, notes: &mut Vec<String>) -> Result<Option<Vec<usize>>> {
     if !config.is_file() {
-        return Ok(());
+        return Ok(None);
     }
     let text = files::read_text(config)?;
     let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
@@ -105,10 +115,10 @@ fn fill_from_config(radar: &mut Table, config: &Path, sensor: &Path, notes: &mut
         if value.get("labels").and_then(|labels| labels.as_object()).is_some_and(|labels| !labels.is_empty()) {
             notes.push(format!("{}: labels are not read: give them with --label", config.display()));
         }
-        return Ok(());
+        return Json::read(config)?.find(INVERTED_RX).map(|places| places.items()?.iter().map(Json::count).collect()).transpose();
     }
     fill_from_properties(radar, &properties_in(&text, &sensor.file_name().unwrap_or_default().to_string_lossy()));
-    Ok(())
+    Ok(None)
 }
 
 /// Names of a rover's properties of a radar.

@@ -7,13 +7,15 @@ use std::path::{Path, PathBuf};
 
 use super::boards::Board;
 use super::lanes::Lanes;
-use super::{Stated, stream::Words};
+use super::{Stated, inverted, stream::Words};
 use crate::error::{Error, Result};
 use crate::radar::{Radar, Sampling};
 
-/// What to do where transmitters send with phases that are switched between 0 and a half turn (BPM), or shifted by others.
+/// What to do where transmitters send with phases that are switched between 0 and a half turn (BPM), that run on by a step of each
+/// transmitter's own (DDMA), or that are shifted by others.
 pub const SWITCHED: &str =
     "separate the transmitters (sums and differences of the two chirps) and import the array with --layout";
+pub const DIVIDED: &str = "separate the transmitters by their Doppler frequencies and import the array with --layout";
 pub const SHIFTED: &str = "turn the samples of each chirp back by its phase and import the array with --layout; of a description whose phase \
                            shifters were off, set the field to 0";
 
@@ -42,10 +44,36 @@ pub struct Chirp {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Burst {
     pub chirps: Vec<Chirp>,
+    /// In all, those of repeated bursts too.
     pub loops: usize,
+    /// Where the loops come in several bursts: how.
+    pub repeated: Option<Repeated>,
 }
 
+/// Bursts of equal loops, one after the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Repeated {
+    pub loops_of_each: usize,
+    /// From a burst's start to the next one's.
+    pub period_s: f64,
+}
+
+/// The step in which a radar counts the period of bursts (rlSubFrameCfg_t.burstPeriodicity).
+const BURST_STEP_S: f64 = 5e-9;
+
 impl Burst {
+    /// `number` bursts of so many loops each; `period_s`: from one to the next, where there are several.
+    pub fn of(chirps: Vec<Chirp>, loops_of_each: usize, number: usize, period_s: f64) -> Self {
+        let repeated = (number > 1).then_some(Repeated { loops_of_each, period_s });
+        Self { chirps, loops: loops_of_each.saturating_mul(number), repeated }
+    }
+
+    /// The same with one profile for all chirps.
+    pub fn forced(mut self, profile: usize) -> Self {
+        self.chirps.iter_mut().for_each(|chirp| chirp.profile = profile);
+        self
+    }
+
     /// The profiles of its chirps, each once.
     fn profiles(&self) -> Vec<usize> {
         let mut used: Vec<usize> = self.chirps.iter().map(|chirp| chirp.profile).collect();
@@ -144,7 +172,8 @@ impl TiRadar {
             return Err(Error::field(&self.file, "chirps", found, "at least one chirp that was asked for")
                 .with_hint("leave out --tx or --profile, or name another"));
         }
-        self.even(&kept, time_s)?;
+        let loop_s = self.loop_s(burst, time_s)?;
+        self.even(&kept, loop_s)?;
         // Before anything of a frame's size is made: a description may ask for more than there is.
         let words_per_frame = self.words_per_frame()?;
         let mut notes = self.notes.clone();
@@ -170,7 +199,7 @@ impl TiRadar {
             samples_per_chirp: profile.samples,
             loops_per_frame: starts.len(),
             adc_start_s: profile.adc_start_s,
-            chirp_period_s: time_s / kept.len() as f64,
+            chirp_period_s: loop_s / kept.len() as f64,
             frame_period_s: self.frame_period_s,
             frames,
             position_m: [0.0; 3],
@@ -215,6 +244,26 @@ impl TiRadar {
         }
     }
 
+    /// From a loop's start to the next one's, of loops whose chirps take `chirps_s`.
+    ///
+    /// # Errors
+    /// Bursts of several loops with a pause between them; a burst that begins before the last one ends.
+    fn loop_s(&self, burst: &Burst, chirps_s: f64) -> Result<f64> {
+        let Some(Repeated { loops_of_each, period_s }) = burst.repeated else { return Ok(chirps_s) };
+        let burst_s = loops_of_each as f64 * chirps_s;
+        let pause_s = period_s - burst_s;
+        match loops_of_each {
+            _ if pause_s.abs() <= BURST_STEP_S => Ok(chirps_s),
+            1 if pause_s > 0.0 => Ok(period_s),
+            _ => {
+                let (lasts, step) = (format!("{:.3} us", 1e6 * burst_s), format!("{:.3} us", 1e6 * period_s));
+                let expected = format!("{lasts}, as long as its {loops_of_each} loops last, or one burst a subframe");
+                Err(Error::field(&self.file, "burst period", step, expected)
+                    .with_hint("a recording's loops are evenly spaced: loops that pause between bursts are not read"))
+            }
+        }
+    }
+
     /// Refuses chirps that a recording's even steps cannot express.
     fn even(&self, kept: &[(f64, usize, usize)], loop_s: f64) -> Result<()> {
         let step_s = loop_s / kept.len() as f64;
@@ -235,18 +284,16 @@ impl TiRadar {
 
     /// Whole frames in the files of one stream, which may be fewer than were ordered.
     pub fn frames_present(&self, words: &Words, words_per_frame: u64, notes: &mut Vec<String>) -> Result<usize> {
-        let (frames, rest) = (words.len() / words_per_frame, words.len() % words_per_frame);
+        let (frames, rest) = (words.len() / words_per_frame, words.bytes() % (2 * words_per_frame));
         if frames == 0 {
-            let found = format!("{} bytes", 2 * words.len());
+            let found = format!("{} bytes", words.bytes());
             let expected = format!("at least {} bytes, one frame of {}", 2 * words_per_frame, self.file.display());
             return Err(Error::field(words.first(), "samples", found, expected)
                 .with_hint("the description belongs to another capture, or the capture was cut off"));
         }
         if rest > 0 {
             notes.push(format!(
-                "{} bytes after the last whole frame are left out: {} frames of {} bytes each",
-                2 * rest,
-                frames,
+                "{rest} bytes after the last whole frame are left out: {frames} frames of {} bytes each",
                 2 * words_per_frame
             ));
         }
@@ -315,12 +362,9 @@ impl TiRadar {
         let tx_m = masks.iter().map(|&mask| middle(mask)).collect::<Result<Vec<_>>>()?;
         let rx_m =
             receivers.iter().map(|&rx| board.rx_m(rx).ok_or_else(|| missing("receivers", rx))).collect::<Result<Vec<_>>>()?;
-        let inverted: Vec<usize> =
-            receivers.iter().enumerate().filter(|(_, rx)| board.inverted_rx.contains(rx)).map(|(at, _)| at).collect();
+        let inverted = inverted::places(board, receivers);
         notes.push(format!("antennas of the {} ({})", board.name, board.source));
-        if !inverted.is_empty() {
-            notes.push(format!("receivers {inverted:?} are fed from the opposite side: their samples are negated"));
-        }
+        notes.extend(inverted::note(&inverted));
         Ok((tx_m, rx_m, inverted))
     }
 }

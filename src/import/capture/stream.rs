@@ -10,15 +10,17 @@ use crate::error::{Error, Result};
 /// The files of one capture, end to end. Words are little-endian; a frame may begin in one file and end in the next.
 pub struct Words {
     files: Vec<(PathBuf, u64)>,
+    /// Half a word at the end of the last file.
+    has_half: bool,
 }
 
 impl Words {
     /// Holds every file's length.
     ///
     /// # Errors
-    /// A file with half a word at its end, of wider numbers, or of packets with their headers.
+    /// A file with half a word at its end that another one follows, of wider numbers, or of packets with their headers.
     pub fn open(paths: &[PathBuf]) -> Result<Self> {
-        let files = paths.iter().map(|path| {
+        let files = paths.iter().enumerate().map(|(at, path)| {
             let metadata = std::fs::metadata(path).map_err(|source| Error::read(path, source))?;
             if !metadata.is_file() {
                 return Err(Error::read(path, std::io::ErrorKind::InvalidInput.into()));
@@ -26,12 +28,17 @@ impl Words {
             match metadata.len() {
                 0 => Err(Error::field(path, "samples", "an empty file", "16-bit samples")
                     .with_hint("the capture did not start; record it again")),
-                odd if odd % 2 == 1 => Err(Error::field(path, "samples", format!("{odd} bytes"), "whole 16-bit samples")
-                    .with_hint("the file is cut off; copy it again")),
+                odd if odd % 2 == 1 && at + 1 < paths.len() => {
+                    Err(Error::field(path, "samples", format!("{odd} bytes"), "whole 16-bit samples")
+                        .with_hint("the file is cut off; copy it again"))
+                }
                 length => Ok((path.clone(), length / 2)),
             }
         });
-        let words = Self { files: files.collect::<Result<_>>()? };
+        let mut words = Self { files: files.collect::<Result<_>>()?, has_half: false };
+        if let Some(last) = paths.last() {
+            words.has_half = std::fs::metadata(last).map_err(|source| Error::read(last, source))?.len() % 2 == 1;
+        }
         packets::refuse(words.first())?;
         words.refuse_wider()?;
         Ok(words)
@@ -58,19 +65,25 @@ impl Words {
 
     /// The first so many words of each file.
     pub fn of(files: Vec<(PathBuf, u64)>) -> Self {
-        Self { files }
+        Self { files, has_half: false }
     }
 
     pub fn first(&self) -> &Path {
         &self.files[0].0
     }
 
-    /// Every file and its words.
+    /// Every file and its bytes.
     pub fn lengths(&self) -> impl Iterator<Item = (&Path, u64)> {
-        self.files.iter().map(|(path, words)| (path.as_path(), *words))
+        let half = |at: usize| u64::from(self.has_half && at + 1 == self.files.len());
+        self.files.iter().enumerate().map(move |(at, (path, words))| (path.as_path(), 2 * words + half(at)))
     }
 
-    /// Words in all files together.
+    /// Bytes in all files together; half a word at the end counts, too.
+    pub fn bytes(&self) -> u64 {
+        2 * self.len() + u64::from(self.has_half)
+    }
+
+    /// Whole words in all files together.
     pub fn len(&self) -> u64 {
         self.files.iter().map(|(_, words)| words).sum()
     }

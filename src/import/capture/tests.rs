@@ -172,7 +172,15 @@ fn a_setup_names_its_files_and_its_radar() {
     )
     .unwrap();
     // An empty name of a file is no file: mmWave Studio writes one where nothing was processed.
-    assert_frames(&mut open(&[setup], &isk()).unwrap(), code);
+    assert_frames(&mut open(std::slice::from_ref(&setup), &isk()).unwrap(), code);
+    // A processed file that is not there leaves the raw one; one that is there is taken.
+    let text =
+        fs::read_to_string(&setup).unwrap().replace(r#""processedFileName": """#, r#""processedFileName": "processed.bin""#);
+    fs::write(&setup, text).unwrap();
+    assert_frames(&mut open(std::slice::from_ref(&setup), &isk()).unwrap(), code);
+    let processed = folder.path().join("processed.bin");
+    fs::copy(folder.path().join("adc_data.bin"), &processed).unwrap();
+    assert_eq!(open(&[setup], &isk()).unwrap().source, processed);
 }
 
 #[test]
@@ -276,6 +284,22 @@ fn a_capture_that_is_cut_off_keeps_its_whole_frames() {
     assert_eq!(capture.radar.frames, 1);
     assert!(capture.notes.iter().any(|note| note.contains("2 frames were ordered, 1 are there")), "{:?}", capture.notes);
     assert_frames(&mut capture, code);
+}
+
+/// Half a word at the end is left out as what else follows the last frame; in the middle of a stream nothing fits any more.
+#[test]
+fn half_a_word_is_left_out_at_the_end_alone() {
+    let mut bytes: Vec<u8> = two_lane_words().iter().flat_map(|word| word.to_le_bytes()).collect();
+    bytes.push(7);
+    let (folder, bin) = capture_folder(&[], "a.mmwave.json", &mmwave_json());
+    fs::write(&bin, &bytes).unwrap();
+    let mut capture = open(std::slice::from_ref(&bin), &isk()).unwrap();
+    assert!(capture.notes.iter().any(|note| note.starts_with("1 bytes after the last whole frame")), "{:?}", capture.notes);
+    assert_frames(&mut capture, code);
+    let second = folder.path().join("adc_data_1.bin");
+    fs::copy(&bin, &second).unwrap();
+    let error = open(&[bin, second], &isk()).err().unwrap();
+    assert!(error.to_string().ends_with("expected whole 16-bit samples") && error.hint().is_some(), "{error}");
 }
 
 #[test]

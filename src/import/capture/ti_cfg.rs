@@ -8,10 +8,13 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::lanes::Lanes;
-use super::schedule::{Burst, Chirp, Profile, SHIFTED, SWITCHED, TiRadar, check_ramp, sampling_of};
+use super::schedule::{Burst, Chirp, DIVIDED, Profile, SHIFTED, SWITCHED, TiRadar, check_ramp, sampling_of};
 use crate::data::files;
 use crate::error::{Error, Result};
 use crate::radar::Sampling;
+
+/// What the radar's program writes before it waits for a command (`mmwDemo:/>`) ends so.
+const PROMPT: &str = ":/>";
 
 /// One line: its number, its command, its arguments.
 struct Line<'a> {
@@ -59,14 +62,8 @@ impl Line<'_> {
 /// Reads the radar. A later line of the same command and number takes the earlier one's place, as on the radar.
 pub fn read_radar(file: &Path) -> Result<TiRadar> {
     let text = read_text(file)?;
-    let lines: Vec<Line> = text
-        .lines()
-        .enumerate()
-        .filter_map(|(index, line)| {
-            let mut words = line.split(['%', '#']).next()?.split_whitespace();
-            Some(Line { file, number: index + 1, command: words.next()?, arguments: words.collect() })
-        })
-        .collect();
+    let lines = lines(file, &text);
+    refuse_unread(&lines)?;
     let all = |command: &str| lines.iter().filter(|line| line.command == command).collect::<Vec<_>>();
     let last = |command: &str| {
         all(command).pop().ok_or_else(|| {
@@ -85,14 +82,6 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         Some(advanced) => advanced_frame(advanced, &all("subFrameCfg"), &chirps)?,
         None => frame(last("frameCfg")?, &chirps)?,
     };
-    // bpmCfg <subframe> <enabled> <first chirp> <second chirp>
-    for line in all("bpmCfg") {
-        if line.count_at(1)? != 0 {
-            return Err(line
-                .wrong("transmitters that send together with switched phases", "0: time division")
-                .with_hint(SWITCHED));
-        }
-    }
     let mut notes: Vec<String> = profiles.iter().filter_map(|profile| check_ramp(file, profile)).collect();
     last("adcbufCfg")?;
     // Without the subframe in SDK 1.
@@ -114,6 +103,47 @@ pub fn read_radar(file: &Path) -> Result<TiRadar> {
         notes,
     };
     radar.checked()
+}
+
+/// The commands that hold: of a log, those after the last `flushCfg`, which leaves only what is set of the ADC's buffer and of the
+/// stream. The prompt of a copied terminal is no command.
+fn lines<'a>(file: &'a Path, text: &'a str) -> Vec<Line<'a>> {
+    let line = |(index, line): (usize, &'a str)| {
+        let written = line.split(['%', '#']).next()?;
+        let mut words = written.rsplit_once(PROMPT).map_or(written, |(_, typed)| typed).split_whitespace();
+        Some(Line { file, number: index + 1, command: words.next()?, arguments: words.collect() })
+    };
+    let mut lines: Vec<Line> = text.lines().enumerate().filter_map(line).collect();
+    if let Some(flush) = lines.iter().rposition(|line| line.command == "flushCfg") {
+        let stays = |line: &Line| ["adcbufCfg", "lvdsStreamCfg"].contains(&line.command);
+        let mut place = 0..;
+        lines.retain(|line| place.next().is_some_and(|place| place > flush) || stays(line));
+    }
+    lines
+}
+
+/// Refuses commands of another SDK, and of transmitters that send at once.
+fn refuse_unread(lines: &[Line]) -> Result<()> {
+    for line in lines {
+        let together = |found: &str, hint: &str| Err(line.wrong(found, "time division").with_hint(hint));
+        match line.command {
+            "chirpComnCfg" | "chirpTimingCfg" => {
+                let expected = "commands of the mmWave SDK 1 to 3 or of the MCU+ SDK: profileCfg, chirpCfg, frameCfg";
+                return Err(line
+                    .wrong("a command of the MMWAVE-L SDK (xWRL6432, xWRL1432), which is not read", expected)
+                    .with_hint(
+                        "describe the samples with --layout, and the radar with --config FILE.toml or --set radar.KEY=VALUE",
+                    ));
+            }
+            // bpmCfg <subframe> <enabled> <first chirp> <second chirp>
+            "bpmCfg" if line.count_at(1)? != 0 => {
+                return together("transmitters that send together with switched phases", SWITCHED);
+            }
+            "ddmPhaseShiftAntOrder" => return together("transmitters that send together, told apart by Doppler (DDMA)", DIVIDED),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// The text of a file whose commands are ASCII: comments may be of another encoding.
@@ -210,25 +240,36 @@ fn chirps(lines: &[&Line]) -> Result<Vec<(usize, Chirp)>> {
     Ok(all)
 }
 
-fn burst(line: &Line, chirps: &[(usize, Chirp)], first: usize, count: usize, loops: usize) -> Result<Burst> {
+/// The chirps from `first` on.
+fn chosen(line: &Line, chirps: &[(usize, Chirp)], first: usize, count: usize) -> Result<Vec<Chirp>> {
     let chirp = |index| chirps.iter().find(|(own, _)| *own == index).map(|(_, chirp)| chirp.clone());
-    let chosen = (first..first + count)
-        .map(|index| chirp(index).ok_or_else(|| line.wrong(format!("chirp {index}"), "a chirp of a chirpCfg line")));
-    Ok(Burst { chirps: chosen.collect::<Result<_>>()?, loops })
+    (first..first + count)
+        .map(|index| chirp(index).ok_or_else(|| line.wrong(format!("chirp {index}"), "a chirp of a chirpCfg line")))
+        .collect()
 }
 
-/// frameCfg first last loops frames period_ms …
+/// frameCfg first last loops frames [samples] period_ms trigger delay
 fn frame(line: &Line, chirps: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
     let (first, last) = (line.count_at(0)?, line.count_at(1)?);
     let count =
         (last + 1).checked_sub(first).ok_or_else(|| line.wrong(format!("chirps {first} to {last}"), "an ascending range"))?;
     let frames = line.count_at(3)?;
-    Ok((vec![burst(line, chirps, first, count, line.count_at(2)?)?], line.amount_at(4)? * 1e-3, (frames > 0).then_some(frames)))
+    let burst = Burst::of(chosen(line, chirps, first, count)?, line.count_at(2)?, 1, 0.0);
+    // The MCU+ SDK (AWR294x, AWR2544) has numAdcSamples before the period.
+    let period_at = if line.arguments.len() >= 8 { 5 } else { 4 };
+    Ok((vec![burst], line.amount_at(period_at)? * 1e-3, (frames > 0).then_some(frames)))
 }
 
-/// advFrameCfg subframes profile frames …; subFrameCfg index profile first chirps loops burst_ms offset bursts burst_loops period_ms
+/// advFrameCfg subframes forces_profile frames …; subFrameCfg index profile first chirps loops burst_ms offset bursts burst_loops period_ms
 fn advanced_frame(line: &Line, subframes: &[&Line], chirps: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
     let count = line.count_at(0)?;
+    let is_forced = match line.count_at(1)? {
+        0 => false,
+        1 => true,
+        other => {
+            return Err(line.wrong(format!("{other} at place 2"), "1: a profile for each subframe, or 0: those of the chirps"));
+        }
+    };
     let (mut bursts, mut period_s) = (Vec::new(), 0.0);
     for index in 0..count {
         let subframe = subframes
@@ -239,8 +280,9 @@ fn advanced_frame(line: &Line, subframes: &[&Line], chirps: &[(usize, Chirp)]) -
         if subframe.count_at(7)? > 1 {
             return Err(subframe.wrong("several bursts", "one burst a subframe"));
         }
-        let loops = subframe.count_at(4)? * subframe.count_at(8)?.max(1);
-        bursts.push(burst(subframe, chirps, subframe.count_at(2)?, subframe.count_at(3)?, loops)?);
+        let chirps = chosen(subframe, chirps, subframe.count_at(2)?, subframe.count_at(3)?)?;
+        let burst = Burst::of(chirps, subframe.count_at(4)?, subframe.count_at(8)?.max(1), subframe.amount_at(5)? * 1e-3);
+        bursts.push(if is_forced { burst.forced(subframe.count_at(1)?) } else { burst });
         period_s += subframe.amount_at(9)? * 1e-3;
     }
     let frames = line.count_at(2)?;

@@ -35,7 +35,9 @@ pub fn read_setup(path: &Path) -> Result<Setup> {
         for file in captured.items()? {
             let names = ["processedFileName", "rawFileName"].into_iter().filter_map(|key| file.find(key));
             let names = names.map(|name| name.text().map(str::to_string)).collect::<Result<Vec<_>>>()?;
-            files.extend(names.iter().find(|name| !name.is_empty()).map(|name| beside(name)));
+            let named: Vec<PathBuf> = names.iter().filter(|name| !name.is_empty()).map(|name| beside(name)).collect();
+            // What was processed may be left out of a copy: of both, the one that is there.
+            files.extend(named.iter().find(|file| file.is_file()).or(named.first()).cloned());
         }
     }
     Ok(Setup { device, files, config })
@@ -130,7 +132,7 @@ fn of_cascade(path: &Path, device: &Json, id: usize) -> Result<TiRadar> {
 fn joined(whole: &mut TiRadar, own: &TiRadar, at: &Json, id: usize) -> Result<()> {
     let timing = |radar: &TiRadar| {
         let chirps = |burst: &Burst| burst.chirps.iter().map(|chirp| (chirp.profile, chirp.extra_idle_s)).collect::<Vec<_>>();
-        radar.bursts.iter().map(|burst| (burst.loops, chirps(burst))).collect::<Vec<_>>()
+        radar.bursts.iter().map(|burst| (burst.loops, burst.repeated, chirps(burst))).collect::<Vec<_>>()
     };
     let differ = [
         ("rlProfiles", whole.profiles != own.profiles),
@@ -168,6 +170,7 @@ fn in_phase(rf: &Json) -> Result<()> {
     Ok(())
 }
 
+/// Every profile; a later one of the same number takes the earlier one's place, as on the radar.
 fn profiles(rf: &Json) -> Result<Vec<Profile>> {
     let read = |profile: &Json| {
         let profile = profile.get("rlProfileCfg_t")?;
@@ -185,12 +188,22 @@ fn profiles(rf: &Json) -> Result<Vec<Profile>> {
             ramp_end_s: time("rampEndTime_usec")?,
         })
     };
-    rf.get("rlProfiles")?.items()?.iter().map(read).collect()
+    let mut all: Vec<Profile> = Vec::new();
+    for entry in rf.get("rlProfiles")?.items()? {
+        let profile = read(&entry)?;
+        // An unused place of the list has no samples.
+        if profile.samples == 0 && all.iter().any(|other| other.id == profile.id) {
+            continue;
+        }
+        all.retain(|other| other.id != profile.id);
+        all.push(profile);
+    }
+    Ok(all)
 }
 
-/// Every chirp by its index.
+/// Every chirp by its index. A later entry of the same chirp takes the earlier one's place, as on the radar.
 fn chirps(rf: &Json) -> Result<Vec<(usize, Chirp)>> {
-    let mut all = Vec::new();
+    let mut all: Vec<(usize, Chirp)> = Vec::new();
     for entry in rf.get("rlChirps")?.items()? {
         let chirp = entry.get("rlChirpCfg_t")?;
         for key in ["startFreqVar_MHz", "freqSlopeVar_KHz_usec", "adcStartTimeVar_usec"] {
@@ -202,18 +215,23 @@ fn chirps(rf: &Json) -> Result<Vec<(usize, Chirp)>> {
         }
         let extra_idle_s = chirp.find("idleTimeVar_usec").map(|extra| extra.amount()).transpose()?.unwrap_or(0.0) * 1e-6;
         let content = Chirp { profile: chirp.get("profileId")?.count()?, tx_mask: chirp.get("txEnable")?.count()?, extra_idle_s };
-        for index in chirp.get("chirpStartIdx")?.count()?..=chirp.get("chirpEndIdx")?.count()?.min(511) {
+        let (first, last) = (chirp.get("chirpStartIdx")?.count()?, chirp.get("chirpEndIdx")?.count()?.min(511));
+        // An unused place of the list is a chirp 0 that nobody sends.
+        let is_unused = (first, last, content.tx_mask) == (0, 0, 0) && all.iter().any(|(index, _)| *index == 0);
+        for index in (first..=last).filter(|_| !is_unused) {
+            all.retain(|(other, _)| *other != index);
             all.push((index, content.clone()));
         }
     }
     Ok(all)
 }
 
-fn burst(all: &[(usize, Chirp)], first: usize, last: usize, loops: usize, at: &Json) -> Result<Burst> {
+/// The chirps from `first` to `last`.
+fn chosen(all: &[(usize, Chirp)], first: usize, last: usize, at: &Json) -> Result<Vec<Chirp>> {
     let chirp = |index| all.iter().find(|(own, _)| *own == index).map(|(_, chirp)| chirp.clone());
-    let chirps =
-        (first..=last).map(|index| chirp(index).ok_or_else(|| at.wrong(&format!("chirps that are described; {index} is not"))));
-    Ok(Burst { chirps: chirps.collect::<Result<_>>()?, loops })
+    (first..=last)
+        .map(|index| chirp(index).ok_or_else(|| at.wrong(&format!("chirps that are described; {index} is not"))))
+        .collect()
 }
 
 fn frame(rf: &Json) -> Result<(Vec<Burst>, f64, Option<usize>)> {
@@ -224,7 +242,8 @@ fn frame(rf: &Json) -> Result<(Vec<Burst>, f64, Option<usize>)> {
     }
     let frame = rf.get("rlFrameCfg_t")?;
     let count = |key: &str| frame.get(key)?.count();
-    let bursts = vec![burst(&all, count("chirpStartIdx")?, count("chirpEndIdx")?, count("numLoops")?, &frame)?];
+    let chirps = chosen(&all, count("chirpStartIdx")?, count("chirpEndIdx")?, &frame)?;
+    let bursts = vec![Burst::of(chirps, count("numLoops")?, 1, 0.0)];
     let frames = count("numFrames")?;
     Ok((bursts, frame.get("framePeriodicity_msec")?.amount()? * 1e-3, (frames > 0).then_some(frames)))
 }
@@ -232,6 +251,12 @@ fn frame(rf: &Json) -> Result<(Vec<Burst>, f64, Option<usize>)> {
 fn advanced_frame(rf: &Json, all: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64, Option<usize>)> {
     let frame = rf.get("rlAdvFrameCfg_t")?;
     let sequence = frame.get("frameSeq")?;
+    let is_forced = match sequence.find("forceProfile") {
+        Some(forced) if forced.count()? > 1 => {
+            return Err(forced.wrong("1: a profile for each subframe, or 0: those of the chirps"));
+        }
+        forced => forced.is_some_and(|forced| forced.count().is_ok_and(|forced| forced == 1)),
+    };
     let (mut bursts, mut period_s) = (Vec::new(), 0.0);
     for entry in sequence.get("subFrameCfg")?.items()?.iter().take(sequence.get("numOfSubFrames")?.count()?) {
         let subframe = entry.find("rlSubFrameCfg_t").unwrap_or_else(|| entry.clone());
@@ -242,7 +267,10 @@ fn advanced_frame(rf: &Json, all: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64,
             return Err(subframe.wrong("one burst a subframe: several bursts are not read"));
         }
         let last = (first + count("numOfChirps")?).checked_sub(1).ok_or_else(|| subframe.wrong("at least one chirp"))?;
-        bursts.push(burst(all, first, last, count("numLoops")? * of_one("numOfBurstLoops")?, &subframe)?);
+        let number = of_one("numOfBurstLoops")?;
+        let burst_s = if number > 1 { subframe.get("burstPeriodicity_msec")?.amount()? * 1e-3 } else { 0.0 };
+        let burst = Burst::of(chosen(all, first, last, &subframe)?, count("numLoops")?, number, burst_s);
+        bursts.push(if is_forced { burst.forced(count("forceProfileIdx")?) } else { burst });
         period_s += subframe.get("subFramePeriodicity_msec")?.amount()? * 1e-3;
     }
     let frames = sequence.get("numFrames")?.count()?;

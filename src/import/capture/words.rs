@@ -81,25 +81,24 @@ impl WordArray {
         let mut shape = lengths.shape(layout)?;
         let block = shape.iter().try_fold(1u64, |all, &length| all.checked_mul(length as u64)).unwrap_or(u64::MAX).max(1);
         let words = Words::open(files)?;
-        if let Some((file, own)) = words.lengths().find(|(_, own)| frame_files && *own != block) {
+        if let Some((file, own)) = words.lengths().find(|(_, own)| frame_files && *own != block.saturating_mul(2)) {
             return Err(Error::field(
                 file,
                 "samples",
-                format!("{} bytes", 2 * own),
+                format!("{own} bytes"),
                 format!("{} bytes, one frame", block.saturating_mul(2)),
             )
             .with_hint("the radar's settings belong to another capture, or the file is cut off"));
         }
-        let (frames, rest) = (words.len() / block, words.len() % block);
-        if frames == 0 || layout.place(Axis::Frame).is_none() && words.len() != block {
+        let (frames, rest) = (words.len() / block, words.bytes() % block.saturating_mul(2));
+        if frames == 0 || layout.place(Axis::Frame).is_none() && words.bytes() != block.saturating_mul(2) {
             let expected = format!("{} bytes, one frame of {shape:?} words", block.saturating_mul(2));
-            return Err(Error::field(words.first(), "samples", format!("{} bytes", 2 * words.len()), expected)
+            return Err(Error::field(words.first(), "samples", format!("{} bytes", words.bytes()), expected)
                 .with_hint("the radar's settings or --layout belong to another capture, or the file is cut off"));
         }
         if rest > 0 {
             notes.push(format!(
-                "{} bytes after the last whole frame are left out: {frames} frames of {} bytes each",
-                2 * rest,
+                "{rest} bytes after the last whole frame are left out: {frames} frames of {} bytes each",
                 2 * block
             ));
         }
