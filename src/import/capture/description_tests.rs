@@ -12,6 +12,13 @@ fn opened(config: &str, text: &str) -> Result<Capture> {
     open(&[bin], &Stated { board: Some("IWR6843ISK".into()), ..Stated::default() })
 }
 
+/// A capture whose samples are read, and the folder that holds them.
+fn held(config: &str, text: &str) -> (tempfile::TempDir, Capture) {
+    let (folder, bin) = capture_folder(&two_lane_words(), config, text);
+    let capture = open(&[bin], &Stated { board: Some("IWR6843ISK".into()), ..Stated::default() }).unwrap();
+    (folder, capture)
+}
+
 /// The description with other settings of its transmitters' phases.
 fn json(profile: &str, lists: &str) -> String {
     let json = mmwave_json().replacen(r#""profileId": 0, "startFreq"#, &format!(r#"{profile}"profileId": 0, "startFreq"#), 1);
@@ -125,7 +132,7 @@ fn advanced_json(forced: usize, settings: &str) -> String {
 #[test]
 fn loops_that_pause_between_bursts_are_refused_and_others_are_read() {
     for (config, text) in in_bursts(2, 2, 0.3) {
-        let mut capture = opened(config, &text).unwrap();
+        let (_folder, mut capture) = held(config, &text);
         assert_eq!(capture.radar.dims(), [FRAMES, TX, RX, 4, SAMPLES], "{config}");
         assert!((capture.radar.chirp_period_s - 50e-6).abs() < 1e-12 && (capture.radar.frame_period_s - 0.05).abs() < 1e-12);
         assert_frames(&mut capture, code);
@@ -211,7 +218,7 @@ fn a_log_of_commands_is_read_from_its_last_flush_on_and_without_its_prompts() {
     let old = format!("{advanced}chirpCfg 3 3 0 0 0 0 0 4\n");
     let prompted: String = CFG.trim().lines().map(|line| format!("mmwDemo:/>{line}\nDone\n")).collect();
     let log = format!("{}{old}flushCfg\n{prompted}", CFG.replace("% a comment", ""));
-    let mut capture = opened("a.cfg", &log).unwrap();
+    let (_folder, mut capture) = held("a.cfg", &log);
     assert_eq!(capture.radar.dims(), [FRAMES, TX, RX, 4, SAMPLES]);
     assert_frames(&mut capture, code);
     // What the flush cleared is missing, and what it leaves is not.
