@@ -60,7 +60,7 @@ fn command(line: &str) -> Option<Vec<String>> {
 fn commands(page: &str) -> (Vec<Vec<String>>, Vec<Vec<String>>) {
     let (mut whole, mut text, mut inside) = (vec![], String::new(), false);
     for line in page.lines() {
-        if line.starts_with("```") {
+        if line.trim_start().starts_with("```") {
             inside = !inside;
         } else if inside {
             whole.extend(command(line));

@@ -77,11 +77,9 @@ impl Preset {
         let hint = match (&exact[..], &begun[..]) {
             ([only], _) | ([], [only]) => return all.remove(only).map_or_else(|| Self::named(only), Ok),
             ([], []) => {
-                let nearest =
-                    nearest(&written, all.keys().chain(refused.keys()).map(String::as_str)).expect("the tables are not empty");
-                format!(
-                    "did you mean `{nearest}`? Known are {known}; describe others with --layout, --board and --set radar.KEY=VALUE"
-                )
+                let nearest = nearest(&written, all.keys().chain(refused.keys()).map(String::as_str));
+                let meant = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
+                format!("{meant}Known are {known}; describe others with --layout, --board and --set radar.KEY=VALUE")
             }
             _ => format!("several begin with it: name one of {}", begun.join(", ")),
         };
