@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments, common: &Common) -> Result<()> {
     if path.join("checkpoint.toml").is_file() {
         return show_checkpoint(path, common);
     }
-    if path.is_dir() && !path.join(SETTINGS_FILE).is_file() {
+    if path.is_dir() && !path.join(SETTINGS_FILE).exists() {
         let expected = "a recording (recording.toml) or a checkpoint (checkpoint.toml)";
         return Err(Error::Usage {
             message: format!(
