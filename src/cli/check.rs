@@ -20,7 +20,7 @@ use crate::{
     heatmap::HeatmapConfig,
     integrity::{self, Against},
     plausibility::Sources,
-    radar::{self, FASTEST, Radar},
+    radar::{self, Radar},
     room::Room,
     site::SiteConfig,
     training::checkpoint,
@@ -208,8 +208,8 @@ fn report(recording: &Recording, common: &Common) -> Result<()> {
     }
     let (facts, sources) = of_recording(recording)?;
     // Where it does not hold, a note says so.
-    let of_body = radar::checks(&recording.radar, None, facts.fastest_radial_mps());
-    of_body.iter().filter(|check| check.rule == FASTEST && check.passed == Some(true)).for_each(show_rule);
+    let of_body = facts.fastest_radial_mps().map(|fastest_mps| radar::fastest(&recording.radar, fastest_mps));
+    of_body.iter().filter(|check| check.passed == Some(true)).for_each(show_rule);
     plausible::report(facts, &sources, common)
 }
 
@@ -259,7 +259,7 @@ fn show_radar(radar: &Radar, room: Option<&Room>) {
         ),
         None => say!("  room               none: only what needs no walls will work"),
     }
-    radar::checks(radar, room.and_then(Room::farthest_wall_m), None).iter().for_each(show_rule);
+    radar::checks(radar, room.and_then(Room::farthest_wall_m)).iter().for_each(show_rule);
 }
 
 fn show_rule(check: &radar::Check) {

@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
     /// A motion: BVH, or npz in AMASS layout
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
-    #[arg(long, value_name = "NAME", value_parser = parse_action, help = actions())]
+    #[arg(long, value_name = "NAME", value_parser = parse_action, help = format!("One of the embedded actions: {}", actions()))]
     action: Option<Action>,
     /// A recording whose motion is simulated again and shown beside what was measured
     #[arg(long, value_name = "DIR")]
@@ -76,15 +76,11 @@ impl From<Only> for Part {
 }
 
 fn actions() -> String {
-    let names: Vec<&str> = Action::every().map(Action::name).collect();
-    format!("One of the embedded actions: {}", names.join(", "))
+    Action::every().map(Action::name).collect::<Vec<_>>().join(", ")
 }
 
 fn parse_action(name: &str) -> std::result::Result<Action, String> {
-    Action::every().find(|action| action.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = Action::every().map(Action::name).collect();
-        format!("expected one of {}", names.join(", "))
-    })
+    Action::every().find(|action| action.name() == name).ok_or_else(|| format!("expected one of {}", actions()))
 }
 
 impl Arguments {

@@ -218,28 +218,7 @@ pub fn main() -> ExitCode {
         }
     };
     interrupt::watch();
-    let result =
-        refuse_idle_settings(&cli).and_then(|()| refuse_unknown_device(&cli.common.device)).and_then(|()| match &cli.command {
-            Command::Check(arguments) => check::run(arguments, &cli.common),
-            Command::Import(arguments) => import::run(arguments, &cli.common),
-            Command::Export(arguments) => export::run(arguments, &cli.common),
-            Command::Record(arguments) => record::run(arguments, &cli.common),
-            Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
-            Command::Site(arguments) => site::run(arguments, &cli.common),
-            Command::Train(arguments) => train::run(arguments, &cli.common),
-            Command::Infer(arguments) => infer::run(arguments, &cli.common),
-            Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
-            Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
-            Command::Compare(arguments) => compare::run(arguments, &cli.common),
-            Command::Align(arguments) => align::run(arguments, &cli.common),
-            Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
-            Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
-            Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),
-            Command::Effects(arguments) => catalogue::run(arguments, &cli.common),
-            Command::Completions(arguments) => shell::completions(arguments),
-            Command::Man(arguments) => shell::man(arguments),
-        });
-    match result {
+    match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // What failed because everything is ended has not failed.
@@ -259,6 +238,31 @@ fn show_usage(error: &clap::Error) {
     match std::env::args_os().any(obeyed) {
         true => complain(error.render().to_string().trim_end()),
         false => drop(error.print()),
+    }
+}
+
+fn run(cli: &Cli) -> Result<()> {
+    refuse_idle_settings(cli)?;
+    refuse_unknown_device(&cli.common.device)?;
+    match &cli.command {
+        Command::Check(arguments) => check::run(arguments, &cli.common),
+        Command::Import(arguments) => import::run(arguments, &cli.common),
+        Command::Export(arguments) => export::run(arguments, &cli.common),
+        Command::Record(arguments) => record::run(arguments, &cli.common),
+        Command::Recognize(arguments) => recognize::run(arguments, &cli.common),
+        Command::Site(arguments) => site::run(arguments, &cli.common),
+        Command::Train(arguments) => train::run(arguments, &cli.common),
+        Command::Infer(arguments) => infer::run(arguments, &cli.common),
+        Command::Baseline(arguments) => baseline::run(arguments, &cli.common),
+        Command::Evaluate(arguments) => evaluate::run(arguments, &cli.common),
+        Command::Compare(arguments) => compare::run(arguments, &cli.common),
+        Command::Align(arguments) => align::run(arguments, &cli.common),
+        Command::Diagnose(arguments) => diagnose::run(arguments, &cli.common),
+        Command::Challenge(arguments) => challenge::run(arguments, &cli.common),
+        Command::Reproduce(arguments) => reproduce::run(arguments, &cli.common),
+        Command::Effects(arguments) => catalogue::run(arguments, &cli.common),
+        Command::Completions(arguments) => shell::completions(arguments),
+        Command::Man(arguments) => shell::man(arguments),
     }
 }
 

@@ -138,10 +138,9 @@ impl Table {
             return Err(Error::field(path, "p_values", found, format!("{} that ascend", calibration.answered)));
         }
         let of_detectors = calibration.detectors.iter().map(|(name, list)| (format!("suspects.{name}"), list));
-        let mut lists = of_detectors.chain([("suspicion".to_string(), &calibration.bounds)]);
-        let unsorted = lists.find(|(_, list)| !list.is_sorted()).map(|(key, _)| key);
-        drop(lists);
-        if let Some(key) = unsorted {
+        let unsorted = |(key, list): (String, &Vec<f64>)| (!list.is_sorted()).then_some(key);
+        let key = of_detectors.chain([("suspicion".to_string(), &calibration.bounds)]).find_map(unsorted);
+        if let Some(key) = key {
             return Err(Error::field(path, key, "numbers in another order", "numbers that ascend").with_hint(hint));
         }
         Ok(Self { calibration, bytes })

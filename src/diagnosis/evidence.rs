@@ -359,6 +359,11 @@ pub fn spectrum(chirp: &[Complex64]) -> Vec<Complex64> {
     windowed
 }
 
+/// A Doppler bin with its direction: from half of all on it counts from the end, below zero.
+pub fn signed(doppler: f64, loops: usize) -> f64 {
+    if 2.0 * doppler >= loops as f64 { doppler - loops as f64 } else { doppler }
+}
+
 /// Range-Doppler transform of `[loop, sample]` with Hann windows of unit energy: `[doppler, range]` in FFT order.
 pub fn transform(signal: &[Complex64], samples: usize) -> Vec<Complex64> {
     transform_under(signal, &hann(signal.len() / samples), &hann(samples))

@@ -6,7 +6,7 @@
 mod checks;
 mod presets;
 
-pub use checks::{Check, FASTEST, checks};
+pub use checks::{Check, checks, fastest};
 
 use serde::{Deserialize, Serialize};
 

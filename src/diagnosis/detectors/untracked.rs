@@ -16,7 +16,7 @@ use super::cfar;
 use super::receiver::wandering;
 use super::region::{Region, floor, mean_map, moves, power_gain, removal, run};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::evidence::{Evidence, MAY_MOVE, REACH_M};
+use crate::diagnosis::evidence::{Evidence, MAY_MOVE, REACH_M, signed};
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
@@ -114,15 +114,10 @@ struct Mover<'a> {
     ranges: [f64; 2],
 }
 
-/// A Doppler bin with its direction: from half of all on it counts from the end, below zero.
-fn signed(doppler: usize, loops: usize) -> f64 {
-    if 2 * doppler >= loops { doppler as f64 - loops as f64 } else { doppler as f64 }
-}
-
 impl<'a> Mover<'a> {
     /// From its strongest cell in the maps of single frames.
     fn new(evidence: &'a Evidence, [doppler, range]: [usize; 2]) -> Self {
-        let signed = signed(doppler, evidence.cube.dims[3]);
+        let signed = signed(doppler as f64, evidence.cube.dims[3]);
         let run = run(evidence);
         let stretch = Stretch::new(evidence, run);
         let sign = signed.signum() as i64;
@@ -139,7 +134,7 @@ impl<'a> Mover<'a> {
 
     /// Whether a cell of a single frame's maps is within its region.
     fn holds(&self, d: usize, r: usize) -> bool {
-        let scaled = signed(d, self.evidence.cube.dims[3]) * self.run as f64;
+        let scaled = signed(d as f64, self.evidence.cube.dims[3]) * self.run as f64;
         let (dopplers, ranges) = (self.dopplers, self.ranges);
         (dopplers[0]..=dopplers[1]).contains(&scaled) && (ranges[0]..=ranges[1]).contains(&(r as f64))
     }

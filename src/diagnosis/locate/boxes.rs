@@ -4,6 +4,7 @@ use super::Region;
 use super::residual::Residual;
 use super::sums::{Table, intervals};
 use crate::diagnosis::Evidence;
+use crate::diagnosis::evidence::signed;
 use crate::diagnosis::finding::Place;
 use crate::diagnosis::power::Cells;
 use crate::diagnosis::statistics::{corrected, mean_power_tail};
@@ -138,7 +139,7 @@ fn overlap(a: &Box3, b: &Box3) -> bool {
 
 /// Ends of a half-open interval of Doppler bins, of which the upper half counts from the end, below zero.
 fn dopplers([first, end]: [usize; 2], loops: usize) -> [f64; 2] {
-    let [low, high] = [first, end - 1].map(|bin| if 2 * bin >= loops { bin as f64 - loops as f64 } else { bin as f64 });
+    let [low, high] = [first, end - 1].map(|bin| signed(bin as f64, loops));
     [low.min(high) - 0.5, low.max(high) + 0.5]
 }
 

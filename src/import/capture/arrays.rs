@@ -32,11 +32,10 @@ pub fn open(sources: &[PathBuf], stated: &Stated) -> Result<Capture> {
         }
     };
     let files = files(sources)?;
-    let missing = missing_files(&files);
     let mut notes: Vec<String> =
         preset.map(|preset| format!("laid out as {} ({})", preset.title, preset.page)).into_iter().collect();
     notes.extend(preset.iter().flat_map(|preset| preset.notes.clone()));
-    notes.extend(missing);
+    notes.extend(missing_files(&files));
     let mut settings = Settings::of(stated, &layout, &mut notes)?;
     let number = layout.number.filter(|number| is_words(&files[0]) && number.kind != Kind::Int);
     if is_words(&files[0]) && number.is_none() {

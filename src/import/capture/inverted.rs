@@ -28,9 +28,10 @@ pub fn note_of_array(inverted: &[usize], board: &Board, keys: &[&str]) -> Option
 /// A frame with the samples of these receivers turned back.
 pub fn turned_back(mut frame: IfFrame, inverted: &[usize]) -> IfFrame {
     let [_, n_rx, loops, samples] = frame.dims;
-    let is_inverted = |place: usize| inverted.contains(&(place / (loops * samples) % n_rx));
-    for part in [Some(&mut frame.re), frame.im.as_mut()].into_iter().flatten() {
-        part.iter_mut().enumerate().filter(|(place, _)| is_inverted(*place)).for_each(|(_, value)| *value = -*value);
+    for part in [Some(&mut frame.re), frame.im.as_mut()].into_iter().flatten().filter(|_| !inverted.is_empty()) {
+        let receivers = part.chunks_exact_mut(loops * samples).enumerate();
+        let turned = receivers.filter(|(place, _)| inverted.contains(&(place % n_rx))).flat_map(|(_, values)| values);
+        turned.for_each(|value| *value = -*value);
     }
     frame
 }

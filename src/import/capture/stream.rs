@@ -9,9 +9,8 @@ use crate::error::{Error, Result};
 
 /// The files of one capture, end to end. Words are little-endian; a frame may begin in one file and end in the next.
 pub struct Words {
+    /// With their bytes; the last one may end in half a word.
     files: Vec<(PathBuf, u64)>,
-    /// Half a word at the end of the last file.
-    has_half: bool,
 }
 
 impl Words {
@@ -32,13 +31,10 @@ impl Words {
                     Err(Error::field(path, "samples", format!("{odd} bytes"), "whole 16-bit samples")
                         .with_hint("the file is cut off; copy it again"))
                 }
-                length => Ok((path.clone(), length / 2)),
+                length => Ok((path.clone(), length)),
             }
         });
-        let mut words = Self { files: files.collect::<Result<_>>()?, has_half: false };
-        if let Some(last) = paths.last() {
-            words.has_half = std::fs::metadata(last).map_err(|source| Error::read(last, source))?.len() % 2 == 1;
-        }
+        let words = Self { files: files.collect::<Result<_>>()? };
         packets::refuse(words.first())?;
         words.refuse_wider()?;
         Ok(words)
@@ -65,7 +61,7 @@ impl Words {
 
     /// The first so many words of each file.
     pub fn of(files: Vec<(PathBuf, u64)>) -> Self {
-        Self { files, has_half: false }
+        Self { files: files.into_iter().map(|(path, words)| (path, 2 * words)).collect() }
     }
 
     pub fn first(&self) -> &Path {
@@ -74,18 +70,17 @@ impl Words {
 
     /// Every file and its bytes.
     pub fn lengths(&self) -> impl Iterator<Item = (&Path, u64)> {
-        let half = |at: usize| u64::from(self.has_half && at + 1 == self.files.len());
-        self.files.iter().enumerate().map(move |(at, (path, words))| (path.as_path(), 2 * words + half(at)))
+        self.files.iter().map(|(path, bytes)| (path.as_path(), *bytes))
     }
 
     /// Bytes in all files together; half a word at the end counts, too.
     pub fn bytes(&self) -> u64 {
-        2 * self.len() + u64::from(self.has_half)
+        self.files.iter().map(|(_, bytes)| bytes).sum()
     }
 
     /// Whole words in all files together.
     pub fn len(&self) -> u64 {
-        self.files.iter().map(|(_, words)| words).sum()
+        self.bytes() / 2
     }
 
     /// `count` words from `start` on. Panics beyond the end: callers ask for whole frames only.
@@ -93,8 +88,9 @@ impl Words {
         assert!(start + count as u64 <= self.len(), "words {start} to {} of {}", start + count as u64, self.len());
         let mut bytes = vec![0; 2 * count];
         let (mut skip, mut filled) = (start, 0);
-        for (path, words) in &self.files {
-            if skip >= *words {
+        for (path, length) in &self.files {
+            let words = length / 2;
+            if skip >= words {
                 skip -= words;
                 continue;
             }

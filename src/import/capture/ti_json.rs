@@ -252,10 +252,11 @@ fn advanced_frame(rf: &Json, all: &[(usize, Chirp)]) -> Result<(Vec<Burst>, f64,
     let frame = rf.get("rlAdvFrameCfg_t")?;
     let sequence = frame.get("frameSeq")?;
     let is_forced = match sequence.find("forceProfile") {
-        Some(forced) if forced.count()? > 1 => {
-            return Err(forced.wrong("1: a profile for each subframe, or 0: those of the chirps"));
-        }
-        forced => forced.is_some_and(|forced| forced.count().is_ok_and(|forced| forced == 1)),
+        None => false,
+        Some(forced) => match forced.count()? {
+            number @ 0..=1 => number == 1,
+            _ => return Err(forced.wrong("1: a profile for each subframe, or 0: those of the chirps")),
+        },
     };
     let (mut bursts, mut period_s) = (Vec::new(), 0.0);
     for entry in sequence.get("subFrameCfg")?.items()?.iter().take(sequence.get("numOfSubFrames")?.count()?) {

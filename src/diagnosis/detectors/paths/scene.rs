@@ -6,6 +6,7 @@ use super::background;
 use super::sidelobes::Sidelobes;
 use crate::diagnosis::Evidence;
 use crate::diagnosis::detectors::clutter::clutter_power;
+use crate::diagnosis::evidence::signed;
 use crate::diagnosis::locate::{BODY_FACTOR, CELLS_PER_VALUE};
 use crate::diagnosis::power::{PowerModel, Template};
 use crate::effects;
@@ -249,9 +250,7 @@ impl<'a> Scene<'a> {
 
     /// Of a Doppler bin in FFT order, not unwrapped.
     pub fn velocity_mps(&self, bin: f64) -> f64 {
-        let loops = self.loops as f64;
-        let signed = if bin >= 0.5 * loops { bin - loops } else { bin };
-        signed / self.model.cells.doppler_per_mps
+        signed(bin, self.loops) / self.model.cells.doppler_per_mps
     }
 }
 

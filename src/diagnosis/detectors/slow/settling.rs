@@ -224,9 +224,16 @@ fn locked(field: &Field) -> impl Iterator<Item = f64> {
 /// Energy that a straight line takes out of values by loop whose mean is zero.
 fn slope(values: &[Complex64]) -> f64 {
     let middle = 0.5 * (values.len() as f64 - 1.0);
-    let line = |index: usize| index as f64 - middle;
-    let along = values.iter().enumerate().map(|(index, value)| value * line(index)).sum::<Complex64>();
-    along.norm_sqr() / (0..values.len()).map(|index| line(index).powi(2)).sum::<f64>()
+    along(values, &(0..values.len()).map(|index| index as f64 - middle).collect::<Vec<f64>>())
+}
+
+/// Energy that a course takes out of values.
+fn along(values: &[Complex64], course: &[f64]) -> f64 {
+    values.iter().zip(course).map(|(v, c)| v * c).sum::<Complex64>().norm_sqr() / dot(course, course)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Energy that a sinusoid takes out of values by loop whose mean is zero.
@@ -237,10 +244,8 @@ fn explained(field: &Field, values: &[Complex64], hertz: f64) -> f64 {
         let mean = wave.iter().sum::<f64>() / wave.len() as f64;
         wave.into_iter().map(|value| value - mean).collect()
     };
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (cosine, mut sine) = (wave(0.0), wave(-std::f64::consts::FRAC_PI_2));
     let shared = dot(&sine, &cosine) / dot(&cosine, &cosine);
     sine.iter_mut().zip(&cosine).for_each(|(sine, cosine)| *sine -= shared * cosine);
-    let along = |wave: &[f64]| values.iter().zip(wave).map(|(v, w)| v * w).sum::<Complex64>().norm_sqr() / dot(wave, wave);
-    along(&cosine) + along(&sine)
+    along(values, &cosine) + along(values, &sine)
 }
