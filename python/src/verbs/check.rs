@@ -62,7 +62,7 @@ fn convention(finding: &integrity::Finding) -> Value {
 
 fn radar_rules(recording: &Recording) -> Vec<Value> {
     let farthest_m = recording.room.as_ref().and_then(Room::farthest_wall_m);
-    let rules = checks(&recording.radar, farthest_m, None);
+    let rules = checks(&recording.radar, farthest_m);
     let of = |rule: hybridsim::radar::Check| {
         let hint = (rule.passed == Some(false)).then_some(rule.reason);
         rule.passed.map(|passed| {
