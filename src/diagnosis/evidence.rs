@@ -23,6 +23,7 @@ use super::cube::{Cube, Loaded, Split};
 use super::finding::{Cells, Undo, Volume};
 use super::prediction::BodyPrediction;
 use super::statistics;
+use super::tones::Tones;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, EffectInfo};
 use crate::grid::Grid;
@@ -57,7 +58,9 @@ pub struct Evidence {
     pub accepted_unnamed: Vec<Behaviour>,
     /// What of it undid a fixed law of the samples, oldest first.
     pub(super) inverses: Vec<(Undo, Volume)>,
-    /// Cells of the maps that were taken out of the samples.
+    /// Regions that were taken out of the samples, oldest first.
+    pub(super) regions: Vec<Arc<Tones>>,
+    /// Cells of the maps that were taken out with them.
     pub(super) emptied: Vec<Cells>,
     /// Static returns that were subtracted, `[tx · rx, sample]`, if any.
     pub(super) subtracted: Option<Arc<[Complex64]>>,
@@ -100,6 +103,7 @@ impl Evidence {
             accepted: vec![],
             accepted_unnamed: vec![],
             inverses: vec![],
+            regions: vec![],
             emptied: vec![],
             subtracted: None,
             others_m: vec![],

@@ -9,6 +9,7 @@ use super::course::Course;
 use super::cube::Cube;
 use super::prediction::BodyPrediction;
 use super::statistics::chi2_tail;
+use super::tones::Tones;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, EffectSetting, Stage};
 use crate::radar::Radar;
@@ -157,8 +158,9 @@ pub enum Correction {
     /// Undone in the samples by a law with numbers that the training frames gave, or with a prior for those that they did not: what is
     /// held out is predicted by it as it is.
     Inverse(Undo, Volume),
-    /// Takes cells of the range-Doppler maps out of the samples: there is not even noise left of them.
-    Emptied(Undo, Cells),
+    /// Takes a region of the range-Doppler maps out of the samples, with all that were taken out before: of these cells there is not even
+    /// noise left.
+    Emptied(Arc<Tones>, Cells),
     /// Another correction, after which the phase over time of what it concerned is known.
     Followed(Box<Correction>, Arc<Course>),
     /// Changes what is predicted of the body.
@@ -187,12 +189,12 @@ impl Correction {
         }
     }
 
-    /// What it changes in the samples.
+    /// What it changes in the samples, whatever was taken out of them before.
     pub fn undo(&self) -> Option<&Undo> {
         match self {
-            Self::Samples(undo) | Self::Inverse(undo, _) | Self::Emptied(undo, _) => Some(undo),
+            Self::Samples(undo) | Self::Inverse(undo, _) => Some(undo),
             Self::Followed(correction, _) => correction.undo(),
-            Self::Body(_) | Self::None => None,
+            Self::Emptied(..) | Self::Body(_) | Self::None => None,
         }
     }
 }

@@ -238,6 +238,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::diagnosis::tones::{Region, Tones};
     use crate::diagnosis::{Place, Volume};
 
     fn of(id: Option<&'static str>, behaves_like: Behaviour, gain: f64) -> Candidate {
@@ -301,7 +302,8 @@ mod tests {
             candidate
         };
         let mover = at([1.0, 2.0], Behaviour::PathLike, 1e4);
-        let taken = Candidate { correction: Correction::Emptied(Arc::new(|_| ()), Arc::new(|_, _| false)), ..mover.clone() };
+        let tones = Tones::new([16, 64], 1, Region { range: [9.0, 12.0], doppler: [2.0, 4.0] }, 1e3);
+        let taken = Candidate { correction: Correction::Emptied(Arc::new(tones), Arc::new(|_, _| false)), ..mover.clone() };
         let excess = |range_m: [f64; 2]| at(range_m, Behaviour::ExcessPower, 100.0);
         assert!(is_left_by(&taken, &excess([1.5, 2.5])) && !is_left_by(&taken, &excess([2.5, 3.5])));
         // As a track that was subtracted does.

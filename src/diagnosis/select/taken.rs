@@ -4,6 +4,7 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction};
 use crate::diagnosis::residual::stands_still;
+use crate::diagnosis::tones;
 use crate::effects::Stage;
 
 /// Whether it is a person or a vehicle beside the body, of which limbs are left: what oscillates is taken out whole.
@@ -48,8 +49,9 @@ impl Evidence {
                 undo(&mut self.cube);
                 self.inverses.push((undo.clone(), volume.clone()));
             }
-            Correction::Emptied(undo, cells) => {
-                undo(&mut self.cube);
+            Correction::Emptied(tones, cells) => {
+                self.regions.push(tones.clone());
+                tones::remove(&mut self.cube, &self.split.training, &self.regions);
                 self.emptied.push(cells.clone());
             }
             Correction::Followed(correction, course) => {

@@ -1,13 +1,13 @@
 //! A transient at a chirp's edge that dwarfs the whole chirp, where the room is unknown or the samples have no quadrature.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 
 use super::additive_term::{self, added, counted, digits, gain};
 use super::support::beat_hz;
-use crate::diagnosis::detectors::region::tones;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::corrected;
+use crate::diagnosis::tones::tones;
 use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
@@ -96,15 +96,13 @@ fn stood_out(evidence: &Evidence, affected: &std::ops::Range<usize>) -> bool {
     let end = beat_hz(evidence, NEAR_M) / evidence.radar.sample_rate_hz * samples as f64;
     let basis = tones(samples, [if evidence.is_real() { -end } else { 0.0 }, end]);
     let others: Vec<usize> = (0..samples).filter(|n| !affected.contains(n)).collect();
-    if 2 * basis.len() > others.len() {
+    if 2 * basis.ncols() > others.len() {
         return false;
     }
-    let rows = |of: &[usize]| DMatrix::from_fn(of.len(), basis.len(), |row, column| basis[column][of[row]]);
-    let fitted = rows(&others).svd(true, true);
+    let fitted = basis.select_rows(&others).svd(true, true);
     let least = SINGULAR * fitted.singular_values.max();
     let Ok(inverse) = fitted.pseudo_inverse(least) else { return false };
-    let all: Vec<usize> = (0..samples).collect();
-    let predict = rows(&all) * inverse;
+    let predict = basis * inverse;
     let standing: Vec<Complex64> = evidence.standing().iter().map(|value| sampled(evidence, *value)).collect();
     let left: Vec<Vec<Complex64>> = standing
         .chunks_exact(samples)
