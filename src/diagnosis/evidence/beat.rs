@@ -25,13 +25,19 @@ pub fn range_m(evidence: &Evidence, beat_hz: f64) -> f64 {
     beat_hz * SPEED_OF_LIGHT / (2.0 * evidence.radar.slope_hz_per_s)
 }
 
-/// Ranges of static surfaces: none unless the room is closed in front and on both sides.
+/// Ranges of static surfaces: none unless the room is closed in front, on both sides, below and above. A floor that nobody states may be
+/// nearer than any wall.
 pub fn ranges_m(evidence: &Evidence) -> Option<[f64; 2]> {
     let room = evidence.room.as_ref()?;
-    room.front_m.and(room.left_m).and(room.right_m)?;
+    room.front_m.and(room.left_m).and(room.right_m).and(room.floor_m).and(room.ceiling_m)?;
     let nearest = room.boundaries().into_iter().filter_map(|boundary| room.distance_m(boundary)).fold(f64::INFINITY, f64::min);
     let farthest = room.farthest_m()?;
-    Some([(nearest - CLEARANCE_M).max(0.5 * nearest), farthest * (1.0 + CLEARANCE_SHARE) + CLEARANCE_M])
+    Some(with_clearance([nearest, farthest]))
+}
+
+/// Ranges that static surfaces of some ranges may have.
+pub fn with_clearance([nearest, farthest]: [f64; 2]) -> [f64; 2] {
+    [(nearest - CLEARANCE_M).max(0.5 * nearest), farthest * (1.0 + CLEARANCE_SHARE) + CLEARANCE_M]
 }
 
 /// Beat frequencies, as bins, that hold neither room nor body, of those in which the noise is as it is elsewhere.

@@ -8,11 +8,12 @@
 use num_complex::Complex64;
 
 use super::additive_term::{Chosen, added, is_bent};
-use super::elements::{Element, Images, choose, templates};
+use super::elements::{Element, Images, NEAR_M, choose, templates};
 use super::field::{Field, Fitted, add};
 use super::response;
-use super::support::{UNLIKELY, energy};
+use super::support::{Support, UNLIKELY, energy, range_m, ranges_m};
 use crate::diagnosis::Evidence;
+use crate::diagnosis::evidence::beat::with_clearance;
 use crate::diagnosis::finding::{Candidate, Place};
 use crate::diagnosis::statistics::chi2_tail;
 use crate::effects::Stage;
@@ -23,16 +24,31 @@ const ENOUGH: f64 = 0.8;
 const LEAST_GAIN: f64 = 20.0;
 
 /// Candidates for what is added outside the room's delays: named elements, a filter in their place, or a field without a name.
-/// None where a free field is not significant.
+/// None where a free field is not significant. What stands before the room's surfaces or behind them is of the room: fields are asked
+/// for beside it.
 pub fn find(evidence: &Evidence) -> Vec<Candidate> {
-    let Some(field) = Field::new(evidence) else { return vec![] };
+    let mut ranges_m = ranges_m(evidence);
+    while let Some(field) = ranges_m.and_then(|ranges_m| Field::beside(evidence, ranges_m)) {
+        match beside(evidence, field) {
+            Ok(found) => return found,
+            Err(wider_m) => ranges_m = Some(wider_m),
+        }
+    }
+    vec![]
+}
+
+/// Candidates, or the ranges of static surfaces where these have more than was known.
+fn beside(evidence: &Evidence, field: Field) -> Result<Vec<Candidate>, [f64; 2]> {
     let free = field.free_likelihood();
     let p_free = chi2_tail(2.0 * free, field.freedom());
     if p_free > 1e-4 {
-        return vec![];
+        return Ok(vec![]);
     }
     let images = Images::new(evidence, &field);
     let elements = choose(evidence, &field, &images);
+    if let Some(wider_m) = wider_m(evidence, &field, &elements) {
+        return Err(wider_m);
+    }
     let fitted = field.fit(&templates(&elements, &images));
     let free_gain = field.gain(None, &field.mean);
     let explained = field.gain(None, &fitted.predicted);
@@ -48,7 +64,7 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
             && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
             && (!named || found.likelihood > found.additive)
     });
-    match filter {
+    Ok(match filter {
         Some(found) if found.chance >= UNLIKELY => vec![found.candidate],
         None if explained >= ENOUGH * free_gain => {
             // The field is sure; what an element's numbers are is another question.
@@ -58,7 +74,20 @@ pub fn find(evidence: &Evidence) -> Vec<Candidate> {
         }
         _ if free_gain < LEAST_GAIN || bent => vec![],
         _ => unexplained(evidence, &field, p_free, free_gain).into_iter().collect(),
-    }
+    })
+}
+
+/// Ranges of static surfaces with those of what stands beside them, if anything does.
+fn wider_m(evidence: &Evidence, field: &Field, elements: &[Element]) -> Option<[f64; 2]> {
+    let ranges_m = elements.iter().filter_map(|element| match element {
+        Element::Return(turns) => Some(range_m(evidence, turns * evidence.radar.sample_rate_hz)),
+        _ => None,
+    });
+    let Support { low_m, high_m, .. } = field.support;
+    ranges_m
+        .map(|range_m| with_clearance([range_m, range_m]))
+        .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+        .map(|[nearest_m, farthest_m]| [low_m.min(nearest_m.max(NEAR_M)), high_m.max(farthest_m)])
 }
 
 /// Mean chirps less what the elements add to them.
@@ -101,6 +130,7 @@ mod tests {
     use super::super::elements::scene;
     use super::*;
     use crate::effects;
+    use crate::room::Room;
 
     #[test]
     fn a_leakage_that_no_single_tone_describes_is_one_and_is_taken_out_in_full() {
@@ -113,5 +143,21 @@ mod tests {
         assert!(low < 0.08 && 0.08 < high, "{low} to {high}");
         let (before, after) = (likelihood(&evidence), likelihood(&evidence.with(leaks[0])));
         assert!(after < 1e-3 * before, "{after} of {before}");
+    }
+
+    /// A table that nobody stated: what the room's delays leave of it is neither a leakage nor a transient.
+    #[test]
+    fn what_stands_before_the_rooms_surfaces_has_no_name_of_the_receivers() {
+        let (leaking, turns_per_m) = scene::leaking();
+        for table_m in [0.8, 1.3, 1.6] {
+            let mut evidence = Evidence::in_noise(leaking.radar.clone(), 7, |[_, rx, _, n]| {
+                let tone = |range_m: f64| Complex64::cis(std::f64::consts::TAU * turns_per_m * range_m * n as f64 + rx as f64);
+                tone(3.0) * 30.0 + tone(table_m) * 60.0
+            });
+            let walls = Room { left_m: Some(2.2), right_m: Some(2.2), ..Room::default() };
+            evidence.room = Some(Room { floor_m: Some(2.2), ceiling_m: Some(2.2), front_m: Some(4.0), ..walls });
+            let found = find(&evidence);
+            assert!(found.iter().all(|found| found.id.is_none()), "{table_m} m: {found:?}");
+        }
     }
 }

@@ -58,7 +58,7 @@ impl Chosen<'_> {
             Element::Offset => self.offset(&term, first),
             Element::Leakage(turns) => term.leakage(evidence, turns, |turns| beside(Element::Leakage(turns))),
             Element::Start(count) | Element::End(count) => term.edge(field, count, matches!(element, Element::End(_))),
-            Element::Image | Element::Square => return None,
+            Element::Return(_) | Element::Image | Element::Square => return None,
         };
         Some(Candidate { id, estimates, statement, ..added(evidence, term.chirps, place, p_value, nats) })
     }

@@ -9,7 +9,7 @@ use crate::diagnosis::detectors::climb::golden_section;
 use crate::effects;
 
 /// Leakage over the board is nearer than this.
-const NEAR_M: f64 = 0.5;
+pub const NEAR_M: f64 = 0.5;
 /// Longest transient at an edge, samples.
 const LONGEST_EDGE: usize = 16;
 const MOST_ELEMENTS: usize = 8;
@@ -21,6 +21,8 @@ pub enum Element {
     Offset,
     /// Beat frequency in turns per sample.
     Leakage(f64),
+    /// Of something at rest before the room's surfaces or behind them, at a beat frequency in turns per sample.
+    Return(f64),
     Start(usize),
     End(usize),
     Image,
@@ -32,6 +34,7 @@ impl Element {
         match self {
             Self::Offset => effects::dc_offset::ID,
             Self::Leakage(_) => effects::tx_leakage::ID,
+            Self::Return(_) => effects::static_reflector::ID,
             Self::Start(_) | Self::End(_) => effects::ramp_edge_transient::ID,
             Self::Image => effects::iq_imbalance::ID,
             Self::Square => effects::second_harmonic::ID,
@@ -88,7 +91,7 @@ pub fn columns(element: &Element, samples: usize) -> Vec<Vec<Complex64>> {
     let impulse = |at: usize| (0..samples).map(|n| if n == at { Complex64::ONE } else { Complex64::ZERO }).collect();
     match *element {
         Element::Offset => vec![vec![Complex64::ONE; samples]],
-        Element::Leakage(turns) => vec![tone(turns, samples)],
+        Element::Leakage(turns) | Element::Return(turns) => vec![tone(turns, samples)],
         Element::Start(count) => (0..count).map(impulse).collect(),
         Element::End(count) => (samples - count..samples).map(impulse).collect(),
         Element::Image | Element::Square => vec![],
@@ -99,7 +102,7 @@ pub fn columns(element: &Element, samples: usize) -> Vec<Vec<Complex64>> {
 pub fn unknowns(element: &Element, channels: usize) -> f64 {
     match element {
         Element::Offset => channels as f64,
-        Element::Leakage(_) => channels as f64 + 0.5,
+        Element::Leakage(_) | Element::Return(_) => channels as f64 + 0.5,
         Element::Start(count) | Element::End(count) => (count * channels) as f64,
         Element::Image | Element::Square => 1.0,
     }
@@ -107,7 +110,8 @@ pub fn unknowns(element: &Element, channels: usize) -> f64 {
 
 /// The elements that a recording holds. A constant only where the others leave it estimable.
 pub fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Element> {
-    let is_known = |element: &Element| evidence.info(element.id()).is_some();
+    // Something may stand where the room has nothing, whether or not that has a name.
+    let is_known = |element: &Element| matches!(element, Element::Return(_)) || evidence.info(element.id()).is_some();
     let all = chosen(evidence, field, images, is_known);
     if inflation_of_offset(field, &all) < MOST_INFLATED {
         return all;
@@ -128,10 +132,10 @@ fn inflation_of_offset(field: &Field, elements: &[Element]) -> f64 {
 
 /// One after the other, of those that may be.
 fn chosen(evidence: &Evidence, field: &Field, images: &Images, may_be: impl Fn(&Element) -> bool) -> Vec<Element> {
-    let near = leakages(evidence);
+    let (near, asides) = (leakages(evidence), asides(evidence, field));
     let mut chosen: Vec<Element> = vec![];
     while chosen.len() < MOST_ELEMENTS {
-        let mut options = Next::new(field, images, &chosen).options(&near);
+        let mut options = Next::new(field, images, &chosen).options(&near, &asides);
         options.retain(|(_, element)| may_be(element));
         let best = options.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         match best {
@@ -139,7 +143,7 @@ fn chosen(evidence: &Evidence, field: &Field, images: &Images, may_be: impl Fn(&
             _ => break,
         }
         if chosen.iter().filter(|element| matches!(element, Element::Leakage(_))).count() > 0 && chosen.len() > 1 {
-            improve(field, images, &mut chosen, near[1] - near[0]);
+            improve(field, images, &mut chosen, &near);
         }
     }
     chosen
@@ -147,11 +151,24 @@ fn chosen(evidence: &Evidence, field: &Field, images: &Images, may_be: impl Fn(&
 
 /// Grid of a leakage's beat frequencies, turns per sample.
 fn leakages(evidence: &Evidence) -> Vec<f64> {
-    let samples = evidence.cube.dims[4];
-    let highest = beat_hz(evidence, NEAR_M) / evidence.radar.sample_rate_hz;
-    let lowest = beat_hz(evidence, 0.01) / evidence.radar.sample_rate_hz;
-    let grid = (highest * samples as f64 * 12.0).ceil().max(2.0) as usize;
-    (0..=grid).map(|i| lowest + (highest - lowest) * i as f64 / grid as f64).collect()
+    grid([0.01, NEAR_M].map(|range_m| turns(evidence, range_m)), evidence.cube.dims[4], 12.0)
+}
+
+/// Grids of the beat frequencies of what stands before the room's surfaces, and as far behind them, turns per sample.
+fn asides(evidence: &Evidence, field: &Field) -> Vec<Vec<f64>> {
+    let (low_m, high_m) = (field.support.low_m, field.support.high_m);
+    let ends = [[NEAR_M, low_m], [high_m, 2.0 * high_m]].map(|ends| ends.map(|range_m| turns(evidence, range_m).min(1.0)));
+    ends.into_iter().filter(|ends| ends[0] < ends[1]).map(|ends| grid(ends, evidence.cube.dims[4], 4.0)).collect()
+}
+
+fn turns(evidence: &Evidence, range_m: f64) -> f64 {
+    beat_hz(evidence, range_m) / evidence.radar.sample_rate_hz
+}
+
+/// So many per bin, ends included.
+fn grid([lowest, highest]: [f64; 2], samples: usize, per_bin: f64) -> Vec<f64> {
+    let steps = ((highest - lowest) * samples as f64 * per_bin).ceil().max(2.0) as usize;
+    (0..=steps).map(|i| lowest + (highest - lowest) * i as f64 / steps as f64).collect()
 }
 
 /// The choice of one more element beside those that were chosen.
@@ -193,21 +210,26 @@ impl<'a> Next<'a> {
             - penalty(field) * unknowns(element, channels)
     }
 
-    /// All that may be added, with what it gains; `near`: a grid of leakages' beat frequencies.
-    fn options(&self, near: &[f64]) -> Vec<(f64, Element)> {
+    /// The best of a kind of tones with a beat frequency of a grid, with what it gains.
+    fn tone(&self, grid: &[f64], of: fn(f64) -> Element) -> (f64, Element) {
+        let score = |turns: f64| self.score(&of(turns));
+        let scores = grid.iter().map(|&turns| (score(turns), turns));
+        let best = scores.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(grid[0], |(_, turns)| turns);
+        let turns = within(grid, refine(best, grid[1] - grid[0], score));
+        (score(turns), of(turns))
+    }
+
+    /// All that may be added, with what it gains; `near`: a grid of leakages' beat frequencies, `asides`: of returns beside the room.
+    fn options(&self, near: &[f64], asides: &[Vec<f64>]) -> Vec<(f64, Element)> {
         let chosen = self.chosen;
         let mut options: Vec<(f64, Element)> = vec![];
         if !chosen.contains(&Element::Offset) {
             options.push((self.score(&Element::Offset), Element::Offset));
         }
         if chosen.iter().filter(|element| matches!(element, Element::Leakage(_))).count() < 3 {
-            let score = |turns: f64| self.score(&Element::Leakage(turns));
-            let best = near.iter().map(|&turns| (score(turns), turns)).max_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((_, turns)) = best {
-                let turns = refine(turns, near[1] - near[0], score);
-                options.push((score(turns), Element::Leakage(turns)));
-            }
+            options.push(self.tone(near, Element::Leakage));
         }
+        options.extend(asides.iter().map(|grid| self.tone(grid, Element::Return)));
         for edge in [Element::Start as fn(usize) -> Element, Element::End] {
             if chosen.iter().any(|element| std::mem::discriminant(element) == std::mem::discriminant(&edge(1))) {
                 continue;
@@ -227,18 +249,23 @@ impl<'a> Next<'a> {
     }
 }
 
-/// Moves each leakage's beat frequency where all elements together fit best.
-fn improve(field: &Field, images: &Images, chosen: &mut [Element], step: f64) {
+/// Moves each leakage's beat frequency, of a grid's, where all elements together fit best.
+fn improve(field: &Field, images: &Images, chosen: &mut [Element], near: &[f64]) {
     for index in 0..chosen.len() {
         if let Element::Leakage(turns) = chosen[index] {
             let mut tried = chosen.to_vec();
-            let best = refine(turns, step, |turns| {
+            let best = refine(turns, near[1] - near[0], |turns| {
                 tried[index] = Element::Leakage(turns);
                 field.fit(&templates(&tried, images)).likelihood
             });
-            chosen[index] = Element::Leakage(best);
+            chosen[index] = Element::Leakage(within(near, best));
         }
     }
+}
+
+/// No farther than a grid's ends.
+fn within(grid: &[f64], value: f64) -> f64 {
+    value.clamp(grid[0], grid[grid.len() - 1])
 }
 
 /// A maximum near a grid's best.

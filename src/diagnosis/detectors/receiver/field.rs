@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::support::{Support, dot, energy, support};
+use super::support::{Support, dot, energy, ranges_m, support};
 use crate::diagnosis::Evidence;
 
 /// Mean chirps of the frames outside the support.
@@ -45,8 +45,13 @@ pub struct Fitted {
 }
 
 impl Field {
-    /// The field of a recording's static returns; none where the room's delays leave no direction free.
+    /// The field of a recording's static returns; none where no room is known, or its delays leave no direction free.
     pub fn new(evidence: &Evidence) -> Option<Self> {
+        Self::beside(evidence, ranges_m(evidence)?)
+    }
+
+    /// The same beside ranges in which static surfaces are, m.
+    pub fn beside(evidence: &Evidence, ranges_m: [f64; 2]) -> Option<Self> {
         let [frames, .., loops, samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
         let training = evidence.split.training.clone();
@@ -54,7 +59,7 @@ impl Field {
         let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(<[Complex64]>::to_vec).collect();
         let strongest =
             clutter.iter().zip(&white).map(|(clutter, white)| energy(clutter) / white.max(1e-300)).fold(0.0, f64::max);
-        let support = support(evidence, strongest * training.len() as f64)?;
+        let support = support(evidence, ranges_m, strongest * training.len() as f64)?;
         // Of scaled directions: how many whole ones they are worth.
         let worth: f64 = support.outside.iter().map(|direction| energy(direction)).sum();
         let coordinates: Vec<Vec<Vec<Complex64>>> = (0..frames)

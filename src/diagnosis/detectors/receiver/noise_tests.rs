@@ -29,7 +29,8 @@ fn real_noise(seed: u64) -> Evidence {
     (radar.loops_per_frame, radar.samples_per_chirp, radar.sampling) = (32, 128, Sampling::Real);
     radar.rx_m = vec![[0.0; 3], [0.0019, 0.0, 0.0]];
     let parts: Vec<f32> = std::iter::repeat_with(support::normal(seed)).take(12 * 2 * 32 * 128).map(|part| part as f32).collect();
-    let room = Room { left_m: Some(1.2), right_m: Some(1.2), front_m: Some(3.0), ..Room::default() };
+    let walls = Room { left_m: Some(1.2), right_m: Some(1.2), floor_m: Some(1.2), ceiling_m: Some(1.2), ..Room::default() };
+    let room = Room { front_m: Some(3.0), ..walls };
     Evidence::new(Loaded::of_samples(radar, analytic(&parts, 128), [-1e3, 1e3]), Some(room), None)
 }
 

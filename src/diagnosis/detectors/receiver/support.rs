@@ -46,13 +46,12 @@ pub fn energy(a: &[Complex64]) -> f64 {
     a.iter().map(Complex64::norm_sqr).sum()
 }
 
-/// `contrast`: energy of a mean chirp over the variance of the noise in a sample of it.
-pub fn support(evidence: &Evidence, contrast: f64) -> Option<Support> {
+/// `ranges_m`: of static surfaces; `contrast`: energy of a mean chirp over the variance of the noise in a sample of it.
+pub fn support(evidence: &Evidence, [low_m, high_m]: [f64; 2], contrast: f64) -> Option<Support> {
     let samples = evidence.cube.dims[4];
     if evidence.is_real() || !(16..=MOST_SAMPLES).contains(&samples) || evidence.radar.slope_hz_per_s <= 0.0 {
         return None;
     }
-    let [low_m, high_m] = ranges_m(evidence)?;
     let rate = evidence.radar.sample_rate_hz;
     let (low, high) = (beat_hz(evidence, low_m) / rate, beat_hz(evidence, high_m) / rate);
     let width = high - low;
