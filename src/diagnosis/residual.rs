@@ -61,8 +61,16 @@ pub fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
         })
 }
 
+/// Whether it may be another fit of what was accepted: of the same name, or, without one, of the same behaviour.
+pub fn is_refit(accepted: &Candidate, candidate: &Candidate) -> bool {
+    candidate.id == accepted.id
+        && (accepted.id.is_some() || candidate.behaves_like == accepted.behaves_like)
+        && candidate.choice == accepted.choice
+        && has_shape_of(accepted, candidate)
+}
+
 /// Whether what shapes an effect, such as a frequency, is the same: another fit of it, and not another thing of its name.
-pub fn has_shape_of(accepted: &Candidate, candidate: &Candidate) -> bool {
+fn has_shape_of(accepted: &Candidate, candidate: &Candidate) -> bool {
     let parameters = accepted.id.and_then(effects::info).map_or(&[][..], |info| info.parameters);
     let shapes = parameters.iter().filter(|parameter| parameter.role == effects::Role::Shape);
     let of = |candidate: &Candidate, name: &str| candidate.estimates.iter().position(|estimate| estimate.name == name);
@@ -276,6 +284,14 @@ mod tests {
         assert!(is_left_by(&unnamed, &vibration([26.85, 26.9])));
         assert!(!is_left_by(&unnamed, &vibration([27.1, 27.2])));
         assert!(!is_left_by(&vibration([26.8, 26.9]), &vibration([26.8, 26.9])));
+    }
+
+    #[test]
+    fn what_has_no_name_is_fitted_anew_by_what_behaves_as_it_does() {
+        let drift = |behaves_like: Behaviour| of(None, behaves_like, 100.0);
+        let of_delay = drift(Behaviour::DelayProportionalPhase);
+        assert!(is_refit(&of_delay, &drift(Behaviour::DelayProportionalPhase)));
+        assert!(!is_refit(&of_delay, &drift(Behaviour::SlowTimePhase)));
     }
 
     #[test]

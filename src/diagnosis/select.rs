@@ -18,7 +18,7 @@ use super::evidence::Evidence;
 use super::finding::{Candidate, Correction};
 use super::misfit::Misfit;
 use super::residual::{
-    ROUGHLY, has_shape_of, is_added, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_rough, is_same,
+    ROUGHLY, is_added, is_left_by, is_of_noise, is_of_receivers, is_of_residual, is_product, is_refit, is_rough, is_same,
     leaves_edges,
 };
 use precedence::{is_course_of_all, is_displaced, is_echo, upstream};
@@ -343,12 +343,8 @@ fn refit(
     let stands = |(other, accepted): &(usize, &Accepted)| *other != index && !without.contains(other) && !before(accepted);
     let others = accepted.iter().enumerate().filter(stands);
     let evidence = others.fold(original.clone(), |evidence, (_, effect)| evidence.with(&effect.candidate));
-    let same = |candidate: &Candidate| {
-        candidate.id == effect.candidate.id
-            && candidate.choice == effect.candidate.choice
-            && has_shape_of(&effect.candidate, candidate)
-            && thresholds.passes(effect.detector, candidate, true)
-    };
+    let same =
+        |candidate: &Candidate| is_refit(&effect.candidate, candidate) && thresholds.passes(effect.detector, candidate, true);
     let found = said_by(effect.detector, &evidence).into_iter().filter(same);
     found.max_by(|a, b| a.nats.total_cmp(&b.nats))
 }
