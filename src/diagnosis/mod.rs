@@ -31,6 +31,7 @@ pub mod simulate;
 mod speckle;
 pub mod statistics;
 pub mod support;
+mod vector;
 pub mod detectors;
 
 pub use config::DiagnosisConfig;

@@ -18,6 +18,7 @@ use crate::diagnosis::detectors::description::Description;
 use crate::diagnosis::statistics::UNDECIDED;
 use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
+use crate::paths::distance;
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
 const RANGE_FLOOR_M: f64 = 4e-3;
@@ -186,10 +187,7 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
 fn mean_range_m(trial: &Trial) -> f64 {
     let centre = trial.evidence.radar.centre_m();
     let points = trial.evidence.body.iter().flat_map(|body| body.frames.iter().flatten());
-    let (sum, count) = points.fold((0.0, 0usize), |(sum, count), point| {
-        let square: f64 = (0..3).map(|axis| (point.position_m[axis] - centre[axis]).powi(2)).sum();
-        (sum + square.sqrt(), count + 1)
-    });
+    let (sum, count) = points.fold((0.0, 0usize), |(sum, count), point| (sum + distance(point.position_m, centre), count + 1));
     (sum / count.max(1) as f64).max(0.1)
 }
 
