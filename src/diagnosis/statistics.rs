@@ -76,6 +76,24 @@ pub fn corrected(p: f64, tried: f64) -> f64 {
     (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
 }
 
+/// Logarithm of a sum of exponentials.
+pub fn log_sum(logarithms: impl Iterator<Item = f64> + Clone) -> f64 {
+    let top = logarithms.clone().fold(f64::NEG_INFINITY, f64::max);
+    top + logarithms.map(|value| (value - top).exp()).sum::<f64>().ln()
+}
+
+/// Standard deviation of a number by the curvature of its log-likelihood (second difference over `step`) about the `top`, which it has
+/// `at`; none where it does not fall to both sides.
+pub fn deviation_at_top(nats: impl Fn(f64) -> f64, at: f64, top: f64, step: f64) -> Option<f64> {
+    let curvature = (2.0 * top - nats(at + step) - nats(at - step)) / (step * step);
+    (curvature.is_finite() && curvature > 0.0).then(|| curvature.sqrt().recip())
+}
+
+/// Decibels of a ratio of powers.
+pub fn decibels(ratio: f64) -> f64 {
+    10.0 * ratio.max(1e-30).log10()
+}
+
 /// Chance that a value of the Gumbel law through some draws exceeds one; the law has their first two L-moments (Hosking 1990).
 pub fn gumbel_tail(value: f64, mut drawn: Vec<f64>) -> f64 {
     const EULER: f64 = 0.577_215_664_901_532_9;

@@ -12,10 +12,11 @@ mod spread;
 use rayon::prelude::*;
 
 pub use fit::{Reach, fit_weights, improve, log_likelihood};
-pub use spread::Cells;
+pub use spread::{Cells, hann_power};
 
 use super::Evidence;
 use crate::diagnosis::prediction::{Point, range_and_velocity};
+use crate::diagnosis::vector::{difference, dot, norm};
 use crate::radar::Radar;
 
 /// Doppler bins on either side of zero that hold residuals of static clutter.
@@ -177,7 +178,7 @@ pub fn part_templates(radar: &Radar, cells: &Cells, points: &[Point], parts: usi
 
 /// What a point at a range would return with a reflectivity of one, and the cosine at which it faces the radar.
 fn power_and_facing(point: &Point, range_m: f64, centre: [f64; 3]) -> (f64, f64) {
-    let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
+    let to_radar = difference(centre, point.position_m);
     let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);
     (point.area_m2 / range_m.max(0.1).powi(4), facing)
 }
@@ -247,12 +248,4 @@ fn independent_channels(evidence: &Evidence, expected: &[Vec<f32>]) -> f64 {
     let a = (c - 1.0) / c;
     let rho2 = ((a - ratio * (1.0 + 1.0 / c)) / (a * (1.0 + ratio))).clamp(0.0, 1.0);
     c / (1.0 + (c - 1.0) * rho2)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }

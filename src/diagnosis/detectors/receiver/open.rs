@@ -11,7 +11,7 @@ use super::transient::{self, NEAR_M};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{chi2_tail, corrected, decibels};
 use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
@@ -159,10 +159,6 @@ impl Near {
             .map(|bin| self.spread(bin));
         rank_chance(self.spread(self.peak), reflectors)
     }
-}
-
-fn decibels(ratio: f64) -> f64 {
-    10.0 * ratio.max(1e-30).log10()
 }
 
 /// Powers under a Hann window, zero-padded, `[channel][bin]`.
