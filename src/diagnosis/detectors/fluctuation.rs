@@ -12,11 +12,11 @@ mod returns;
 mod silhouette;
 mod sinusoid;
 
-use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
 use crate::diagnosis::BodyPrediction;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{DECIBEL, corrected};
@@ -160,14 +160,8 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
 /// The part of chirps that lies within two bins of some, `[channel · sample]`.
 fn around(mut chirps: Vec<Complex64>, samples: usize, bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
     const REACH: usize = 2;
-    let mut planner = FftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
     let reached = bins.start().saturating_sub(REACH)..=bins.end() + REACH;
-    forward.process(&mut chirps);
-    for (i, value) in chirps.iter_mut().enumerate() {
-        *value *= if reached.contains(&(i % samples)) { 1.0 / samples as f64 } else { 0.0 };
-    }
-    inverse.process(&mut chirps);
+    Filter::pass(samples, |bin| reached.contains(&bin)).apply(&mut chirps);
     chirps
 }
 

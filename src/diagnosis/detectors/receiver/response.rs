@@ -10,14 +10,15 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::field::{Field, add, orthonormal};
-use super::filters::{Filter, SHAPES, Shape, decay};
+use super::filters::{SHAPES, Shape, decay};
 use super::support::{beat_hz, dot, tone};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::climb::golden_section;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
-use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected};
+use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected, deviation_at_top};
 use crate::effects::Stage;
 
 /// Power that a response must let through to be undone in full.
@@ -131,9 +132,8 @@ impl<'a> Search<'a> {
 
     /// Standard deviation of a value, by the likelihood's curvature there.
     fn deviation(&self, (top, shape, value): Tried) -> f64 {
-        let step = 0.01 * value.abs();
-        let curvature = (2.0 * top - self.likelihood(shape, value + step) - self.likelihood(shape, value - step)) / (step * step);
-        if curvature > 0.0 { curvature.recip().sqrt().max(2e-3 * value.abs()) } else { 0.1 * value.abs() }
+        let deviation = deviation_at_top(|value| self.likelihood(shape, value), value, top, 0.01 * value.abs());
+        deviation.map_or(0.1 * value.abs(), |deviation| deviation.max(2e-3 * value.abs()))
     }
 
     fn candidate(&self, best: Tried, p_value: f64, look_alikes: Vec<&'static str>) -> Candidate {
