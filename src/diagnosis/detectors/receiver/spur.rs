@@ -6,11 +6,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::line::{Line, Strongest, tone};
+use super::line::{Line, Strongest, along, in_chirps, tone, turned_back};
 use super::slow_spur::{self, SlowSpur};
 use super::wandering::{self, Wandering, deviation_bins};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::evidence::{hann, spectrum, transform};
+use crate::diagnosis::evidence::{spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence, denoised};
@@ -212,21 +212,13 @@ fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &Grid<Compl
 
 /// Whether static clutter at other ranges has the same line, in proportion to what it is: then everything is modulated.
 fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let window = hann(loops);
+    let samples = evidence.cube.dims[4];
     let own = fast * samples as f64;
     let apart = |bin: usize| (bin as f64 - own + 0.5 * samples as f64).rem_euclid(samples as f64) - 0.5 * samples as f64;
     let elsewhere: Vec<usize> = (0..samples).filter(|&bin| apart(bin).abs() > AROUND as f64).collect();
     let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(spectrum).collect();
-    let line = |frame: usize, channel: usize| {
-        let mut line = vec![Complex64::ZERO; samples];
-        // The window's side lobes of static clutter are in proportion to it, too.
-        for (chirp, values) in evidence.moving(frame, channel).chunks_exact(samples).enumerate() {
-            let turn = Complex64::cis(-TAU * slow * chirp as f64) * window[chirp];
-            line.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * turn);
-        }
-        spectrum(&line)
-    };
+    // The window's side lobes of static clutter are in proportion to it, too.
+    let line = |frame: usize, channel: usize| spectrum(&turned_back(&evidence.moving(frame, channel), samples, slow));
     // All channels are modulated alike.
     let coherence = |&frame: &usize| {
         let (mut shared, mut lines, mut clutters) = (Complex64::ZERO, 0.0, 0.0);
@@ -245,19 +237,8 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
 
 /// Least squares of the tone in every frame and channel, once static clutter is away.
 fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Grid<Complex64, 2> {
-    let [_, _, _, loops, samples] = cube.dims;
-    let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
-    let (window, slow_window) = (hann(samples), hann(loops));
-    let weight = window.iter().sum::<f64>() * slow_window.iter().sum::<f64>();
-    cube.by_channel(|frame, channel| {
-        let mut sum = Complex64::ZERO;
-        for (chirp, values) in cube.channel(frame, channel).chunks_exact(samples).enumerate() {
-            let of_chirp: Complex64 =
-                values.iter().zip(&in_chirp).zip(&window).map(|((value, turn), weight)| value * turn * *weight).sum();
-            sum += of_chirp * Complex64::cis(-TAU * slow * chirp as f64) * slow_window[chirp];
-        }
-        sum / weight
-    })
+    let samples = cube.dims[4];
+    cube.by_channel(|frame, channel| along(&in_chirps(cube.channel(frame, channel), samples, fast), slow))
 }
 
 /// Frequencies over slow and fast time, turns per chirp and per sample, where the tone is strongest.
