@@ -78,10 +78,7 @@ fn aside(evidence: &Evidence) -> Option<Candidate> {
         .sum();
     let correction = Correction::samples(move |cube| {
         let amplitudes = amplitudes_of(cube, slow, fast);
-        cube.each_chirp(|[frame, channel, chirp], values| {
-            let amplitude = amplitudes[[frame, channel]];
-            values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
-        });
+        subtract(cube, |frame, channel| (slow, fast, amplitudes[[frame, channel]]));
     });
     let how = "where nothing of the room or the body can stay";
     let amplitudes = amplitudes.into_values();
@@ -97,10 +94,8 @@ fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
     }
     let correction = Correction::samples(move |cube| {
         let amplitudes = slow_spur::amplitudes(cube, &starts, turns, fast);
-        cube.each_chirp(|[frame, channel, chirp], values| {
-            let start = Complex64::cis(TAU * turns.per_frame * starts[frame]) * amplitudes[channel];
-            values.iter_mut().enumerate().for_each(|(n, value)| *value -= start * tone(slow, fast, chirp, n));
-        });
+        let start = |frame: usize| Complex64::cis(TAU * turns.per_frame * starts[frame]);
+        subtract(cube, |frame, channel| (slow, fast, start(frame) * amplitudes[channel]));
     });
     let how =
         "in step from frame to frame, at one beat frequency, where whatever turns like that and moves would have left its range";
@@ -116,15 +111,20 @@ fn wanders(evidence: &Evidence) -> Option<Candidate> {
     let turns = slow.clone();
     let correction = Correction::samples(move |cube| {
         let amplitudes = wandering::amplitudes(cube, &turns, fast);
-        cube.each_chirp(|[frame, channel, chirp], values| {
-            let amplitude = amplitudes[[frame, channel]];
-            values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(turns[frame], fast, chirp, n));
-        });
+        subtract(cube, |frame, channel| (turns[frame], fast, amplitudes[[frame, channel]]));
     });
     let how = "at one beat frequency, where whatever turns like that and moves would have left its range";
     let mean = slow.iter().sum::<f64>() / slow.len() as f64;
     let amplitudes = amplitudes.into_values();
     Some(candidate(evidence, Tone { slow: mean, fast, amplitudes, p_value, gain, how, correction }))
+}
+
+/// Takes a tone out of a cube; `of` says, by frame and channel, its turns per chirp and per sample and its amplitude.
+fn subtract(cube: &mut Cube, of: impl Fn(usize, usize) -> (f64, f64, Complex64) + Sync) {
+    cube.each_chirp(|[frame, channel, chirp], values| {
+        let (slow, fast, amplitude) = of(frame, channel);
+        values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
+    });
 }
 
 /// A tone that was found.
