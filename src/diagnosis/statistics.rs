@@ -47,6 +47,11 @@ pub fn normal_tails(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
 }
 
+/// Probability that Student's law of so many degrees of freedom exceeds a value.
+pub fn student_tail(t: f64, freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(t))
+}
+
 /// The ratio of the sums of values and their weights, and the probability that it is as much above zero where the values are independent
 /// around zero, with variances in proportion to their weights (ratio estimator; Student's t).
 pub fn ratio_tail(values: &[f64], weights: &[f64]) -> (f64, f64) {
@@ -60,8 +65,7 @@ pub fn ratio_tail(values: &[f64], weights: &[f64]) -> (f64, f64) {
     let freedom = informative.len() as f64 - 1.0;
     let variance = informative.iter().map(|(value, weight)| (value - ratio * weight).powi(2) / weight).sum::<f64>() / freedom;
     let deviation = (variance / all).sqrt();
-    let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(ratio / deviation.max(f64::MIN_POSITIVE)));
-    (ratio, tail)
+    (ratio, student_tail(ratio / deviation.max(f64::MIN_POSITIVE), freedom))
 }
 
 /// Probability of so many events or more where a mean number is expected.
@@ -74,6 +78,11 @@ pub fn corrected(p: f64, tried: f64) -> f64 {
     let tried = tried.max(1.0);
     // 1 − (1 − p)^n without cancellation.
     (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
+}
+
+/// Smallest and largest of some values; infinite of none.
+pub fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 /// Logarithm of a sum of exponentials.

@@ -87,8 +87,8 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
     };
     let body = evidence.body.as_ref().and_then(|body| {
         let centre = radar.centre_m();
-        let distances = body.frames.get(frame)?.iter().map(|point| distance(point.position_m, centre));
-        let [near, far] = distances.fold([f64::MAX, 0.0], |[near, far]: [f64; 2], d| [near.min(d), far.max(d)]);
+        let points = body.frames.get(frame)?.iter();
+        let [near, far] = statistics::bounds(points.map(|point| distance(point.position_m, centre)));
         (far > 0.0).then_some([near - BODY_MARGIN_M, far + BODY_MARGIN_M])
     });
     let room = evidence.room.as_ref().and_then(|room| {
