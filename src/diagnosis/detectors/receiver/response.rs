@@ -4,19 +4,17 @@
 //! room's delays: what is measured must lie in H · U, with U the space of the room's tones. No knowledge of the scene
 //! inside is needed. A filter that starts from rest leaves a decaying transient at the chirp's beginning instead.
 
-use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::field::{Field, add, orthonormal};
 use super::filters::{SHAPES, Shape, decay};
-use super::support::{beat_hz, dot, tone};
+use super::support::{beat_hz, dot, powers, tone};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::climb::golden_section;
 use crate::diagnosis::detectors::filter::Filter;
-use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
 use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected, deviation_at_top};
 use crate::effects::Stage;
@@ -181,14 +179,10 @@ struct Process {
 impl Process {
     fn new(field: &Field, low: f64, high: f64) -> Self {
         let samples = field.clutter[0].len();
-        let window = hann(samples);
         let long = 2 * samples;
         let mut density = vec![0.0; long];
         for chirp in &field.clutter {
-            let mut padded = vec![Complex64::ZERO; long];
-            (0..samples).for_each(|n| padded[n] = chirp[n] * window[n]);
-            FftPlanner::new().plan_fft_forward(long).process(&mut padded);
-            density.iter_mut().zip(&padded).for_each(|(sum, value)| *sum += value.norm_sqr() / field.clutter.len() as f64);
+            density.iter_mut().zip(powers(chirp, 2)).for_each(|(sum, power)| *sum += power / field.clutter.len() as f64);
         }
         let noise = field.variance.iter().sum::<f64>() / field.variance.len() as f64;
         let (first, last) = ((low * long as f64).floor() as usize, (high * long as f64).ceil() as usize);
