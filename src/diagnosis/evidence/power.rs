@@ -42,8 +42,13 @@ impl Template {
     /// Cells of a dense map that hold more than a millionth of its peak.
     fn of(map: &[f32]) -> Self {
         let least = 1e-6 * map.iter().copied().fold(0.0, f32::max);
-        let (cells, power) =
-            map.iter().enumerate().filter(|(_, power)| **power > least).map(|(cell, &power)| (cell as u32, power)).unzip();
+        Self::keeping(map, |_, power| power > least)
+    }
+
+    /// The cells of a dense map that `keep` wants, by their number and power.
+    pub fn keeping(map: &[f32], keep: impl Fn(usize, f32) -> bool) -> Self {
+        let kept = map.iter().enumerate().filter(|&(cell, &power)| keep(cell, power));
+        let (cells, power) = kept.map(|(cell, &power)| (cell as u32, power)).unzip();
         Self { cells, power }
     }
 }
