@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::cube::Cube;
 use super::evidence::{Evidence, hann, transform};
 use super::finding::{OfSample, Undo};
+use super::statistics::log_sum;
 use super::support::Support;
 
 /// Of the held-out frames, in the samples as they were recorded.
@@ -120,11 +121,11 @@ impl<'a> Laws<'a> {
                 laws.extend(after.laws(channel, &expected[1], &more));
             }
             let mut each: Vec<f64> = laws.iter().map(|law| self.log_density(law, &measured)).collect();
-            let of_laws = log_sum(&each);
+            let of_laws = log_sum(each.iter().copied());
             let weights: Vec<f64> = each.iter().map(|value| (value - of_laws).exp()).collect();
             each.extend(here_inverted.iter().flat_map(|here| self.inverted_densities(frame, channel, &expected[1], here)));
             let sums = self.powers(&measured, &laws, &weights, self.before.variance[channel]);
-            Sums { likelihood: log_sum(&each) - (each.len() as f64).ln(), ..sums }
+            Sums { likelihood: log_sum(each.iter().copied()) - (each.len() as f64).ln(), ..sums }
         };
         (0..self.recording.cube.channels()).map(of_channel).fold(Sums::default(), Sums::and)
     }
@@ -154,12 +155,6 @@ impl<'a> Laws<'a> {
         }
         sums
     }
-}
-
-/// Logarithm of a sum of exponentials.
-fn log_sum(values: &[f64]) -> f64 {
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    most + values.iter().map(|value| (value - most).exp()).sum::<f64>().ln()
 }
 
 /// Static clutter, and the noise.

@@ -32,6 +32,7 @@ mod speckle;
 pub mod statistics;
 pub mod support;
 pub mod tones;
+mod vector;
 pub mod detectors;
 
 pub use config::DiagnosisConfig;

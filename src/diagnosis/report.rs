@@ -14,6 +14,7 @@ use super::misfit::Misfit;
 use super::never;
 use super::null::Null;
 use super::select::{Accepted, Explanation};
+use super::statistics::decibels;
 use crate::effects::EffectInfo;
 
 /// Version of the report's format.
@@ -230,10 +231,6 @@ fn sentence(text: &str) -> String {
     let first: String = letters.next().map(|letter| letter.to_uppercase().collect()).unwrap_or_default();
     let whole = first + letters.as_str();
     if whole.ends_with(['.', '!', '?']) { whole } else { whole + "." }
-}
-
-fn decibels(ratio: f64) -> f64 {
-    10.0 * ratio.max(1e-30).log10()
 }
 
 /// A bound on how probable it is that nothing is missing, from a p-value (Sellke, Bayarri and Berger 2001), equal

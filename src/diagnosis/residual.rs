@@ -4,6 +4,7 @@ use super::detectors::paths;
 use super::finding::{self, Candidate, Correction};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::effects::{self, Stage};
+use crate::paths::distance;
 
 /// What has no name is modelled roughly, and these are modelled most roughly of all: what they leave, up to this share of
 /// their gain, takes any shape; and they come after whatever gains more than it.
@@ -56,9 +57,7 @@ pub fn is_same(accepted: &Candidate, candidate: &Candidate) -> bool {
         && old.rx == new.rx
         && !apart(old.range_m, new.range_m)
         && !apart(old.velocity_mps, new.velocity_mps)
-        && old.position_m.is_none_or(|old| {
-            new.position_m.is_none_or(|new| (0..3).map(|axis| (old[axis] - new[axis]).powi(2)).sum::<f64>() < NEAR_M * NEAR_M)
-        })
+        && old.position_m.is_none_or(|old| new.position_m.is_none_or(|new| distance(old, new) < NEAR_M))
 }
 
 /// Whether it may be another fit of what was accepted: of the same name, or, without one, of the same behaviour.

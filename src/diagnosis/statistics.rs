@@ -47,6 +47,11 @@ pub fn normal_tails(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
 }
 
+/// Probability that Student's law of so many degrees of freedom exceeds a value.
+pub fn student_tail(t: f64, freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(t))
+}
+
 /// The ratio of the sums of values and their weights, and the probability that it is as much above zero where the values are independent
 /// around zero, with variances in proportion to their weights (ratio estimator; Student's t).
 pub fn ratio_tail(values: &[f64], weights: &[f64]) -> (f64, f64) {
@@ -60,8 +65,7 @@ pub fn ratio_tail(values: &[f64], weights: &[f64]) -> (f64, f64) {
     let freedom = informative.len() as f64 - 1.0;
     let variance = informative.iter().map(|(value, weight)| (value - ratio * weight).powi(2) / weight).sum::<f64>() / freedom;
     let deviation = (variance / all).sqrt();
-    let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(ratio / deviation.max(f64::MIN_POSITIVE)));
-    (ratio, tail)
+    (ratio, student_tail(ratio / deviation.max(f64::MIN_POSITIVE), freedom))
 }
 
 /// Probability of so many events or more where a mean number is expected.
@@ -74,6 +78,29 @@ pub fn corrected(p: f64, tried: f64) -> f64 {
     let tried = tried.max(1.0);
     // 1 − (1 − p)^n without cancellation.
     (-(tried * (-p.clamp(0.0, 1.0)).ln_1p()).exp_m1()).clamp(0.0, 1.0)
+}
+
+/// Smallest and largest of some values; infinite of none.
+pub fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+/// Logarithm of a sum of exponentials.
+pub fn log_sum(logarithms: impl Iterator<Item = f64> + Clone) -> f64 {
+    let top = logarithms.clone().fold(f64::NEG_INFINITY, f64::max);
+    top + logarithms.map(|value| (value - top).exp()).sum::<f64>().ln()
+}
+
+/// Standard deviation of a number by the curvature of its log-likelihood (second difference over `step`) about the `top`, which it has
+/// `at`; none where it does not fall to both sides.
+pub fn deviation_at_top(nats: impl Fn(f64) -> f64, at: f64, top: f64, step: f64) -> Option<f64> {
+    let curvature = (2.0 * top - nats(at + step) - nats(at - step)) / (step * step);
+    (curvature.is_finite() && curvature > 0.0).then(|| curvature.sqrt().recip())
+}
+
+/// Decibels of a ratio of powers.
+pub fn decibels(ratio: f64) -> f64 {
+    10.0 * ratio.max(1e-30).log10()
 }
 
 /// Chance that a value of the Gumbel law through some draws exceeds one; the law has their first two L-moments (Hosking 1990).

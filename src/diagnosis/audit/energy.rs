@@ -3,6 +3,7 @@
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::prediction::Point;
 use crate::diagnosis::statistics::ratio_tail;
+use crate::diagnosis::vector::{difference, dot, norm};
 use crate::radar::Radar;
 
 /// Doppler cells about zero that static clutter leaks into.
@@ -132,10 +133,9 @@ pub(super) fn fit(evidence: &Evidence, shown: impl Fn(usize) -> Option<usize>, c
 
 /// Range and radial velocity of a point of the body.
 pub fn range_and_velocity(point: &Point, radar: &Radar) -> [f64; 2] {
-    let centre = radar.centre_m();
-    let to: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - centre[axis]);
-    let range = to.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
-    [range, to.iter().zip(&point.velocity_mps).map(|(x, v)| x * v).sum::<f64>() / range]
+    let to = difference(point.position_m, radar.centre_m());
+    let range = norm(to).max(1e-9);
+    [range, dot(to, point.velocity_mps) / range]
 }
 
 /// Whether the body ever moves fast enough to be distinguished from static returns.

@@ -92,7 +92,7 @@ fn skin(model: &PowerModel, frame: usize) -> Vec<Template> {
         for template in model.lobes[frame].iter().skip(lobe).step_by(LOBES.len()) {
             template.cells.iter().zip(&template.power).for_each(|(&cell, power)| map[cell as usize] += power);
         }
-        sparse(&map)
+        Template::keeping(&map, |_, power| power > 0.0)
     };
     (0..LOBES.len()).map(of_lobe).collect()
 }
@@ -101,13 +101,8 @@ fn skin(model: &PowerModel, frame: usize) -> Vec<Template> {
 fn point(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, part: usize, frame: usize) -> Template {
     let Centre { position_m, velocity_mps } = body.centres[frame][part];
     let (range_m, velocity) = range_and_velocity(&evidence.radar, position_m, velocity_mps);
-    sparse(&model.template(std::iter::once((range_m, velocity, range_m.max(0.1).powi(-4)))))
-}
-
-fn sparse(map: &[f32]) -> Template {
-    let (cells, power) =
-        map.iter().enumerate().filter(|(_, power)| **power > 0.0).map(|(cell, &power)| (cell as u32, power)).unzip();
-    Template { cells, power }
+    let map = model.template(std::iter::once((range_m, velocity, range_m.max(0.1).powi(-4))));
+    Template::keeping(&map, |_, power| power > 0.0)
 }
 
 fn total(template: &Template) -> f64 {

@@ -12,14 +12,14 @@ mod returns;
 mod silhouette;
 mod sinusoid;
 
-use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
 use crate::diagnosis::BodyPrediction;
 use crate::diagnosis::behaviour::Behaviour;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
-use crate::diagnosis::statistics::{DECIBEL, corrected};
+use crate::diagnosis::statistics::{DECIBEL, bounds, corrected};
 use crate::effects::{self, Stage};
 use crate::paths::distance;
 
@@ -75,8 +75,7 @@ impl Free {
 
 /// Ranges that a body's own slow returns may reach. None where it has no points.
 fn reach(body: &BodyPrediction, centre_m: [f64; 3]) -> Option<[f64; 2]> {
-    let points = body.frames.iter().flatten().map(|point| distance(point.position_m, centre_m));
-    let [near_m, far_m] = points.fold([f64::MAX, 0.0], |[near, far]: [f64; 2], d| [near.min(d), far.max(d)]);
+    let [near_m, far_m] = bounds(body.frames.iter().flatten().map(|point| distance(point.position_m, centre_m)));
     (far_m > 0.0).then_some([near_m - MARGIN_M, far_m + MARGIN_M])
 }
 
@@ -127,7 +126,7 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
     let rms = (square / series.change.len() as f64).sqrt();
     let change = series.change.clone();
     let decibel: Vec<f64> = change.iter().map(|v| DECIBEL * (1.0 + v).norm().max(1e-3).ln()).collect();
-    let [low, high] = decibel.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
+    let [low, high] = bounds(decibel.iter().copied());
     let place = Place {
         range_m: Some([range_m - 1.5 * bin_m, range_m + 1.5 * bin_m]),
         velocity_mps: Some([0.0, 0.0]),
@@ -160,14 +159,8 @@ fn candidate(evidence: &Evidence, bin: usize, series: &Series, p_value: f64, nat
 /// The part of chirps that lies within two bins of some, `[channel · sample]`.
 fn around(mut chirps: Vec<Complex64>, samples: usize, bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
     const REACH: usize = 2;
-    let mut planner = FftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
     let reached = bins.start().saturating_sub(REACH)..=bins.end() + REACH;
-    forward.process(&mut chirps);
-    for (i, value) in chirps.iter_mut().enumerate() {
-        *value *= if reached.contains(&(i % samples)) { 1.0 / samples as f64 } else { 0.0 };
-    }
-    inverse.process(&mut chirps);
+    Filter::pass(samples, |bin| reached.contains(&bin)).apply(&mut chirps);
     chirps
 }
 

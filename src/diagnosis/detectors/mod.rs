@@ -9,6 +9,7 @@ pub mod clutter;
 pub mod codes;
 mod description;
 pub mod excess;
+mod filter;
 pub mod fluctuation;
 pub mod geometry;
 pub mod orders;

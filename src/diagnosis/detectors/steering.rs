@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use crate::diagnosis::statistics::bounds;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Beams per beam width of the receivers.
@@ -23,8 +24,8 @@ pub fn wave(radar: &Radar) -> f64 {
 
 /// Extent of the receivers along x; none where they resolve no direction.
 pub fn aperture_m(radar: &Radar) -> Option<f64> {
-    let ends = radar.rx_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at[0]), high.max(at[0])]);
-    Some(ends[1] - ends[0]).filter(|aperture| radar.rx_m.len() > 1 && *aperture > 0.0)
+    let [left, right] = bounds(radar.rx_m.iter().map(|at| at[0]));
+    Some(right - left).filter(|aperture| radar.rx_m.len() > 1 && *aperture > 0.0)
 }
 
 /// Sum over the receivers.

@@ -12,10 +12,11 @@ mod spread;
 use rayon::prelude::*;
 
 pub use fit::{Reach, fit_weights, improve, log_likelihood};
-pub use spread::Cells;
+pub use spread::{Cells, hann_power};
 
 use super::Evidence;
 use crate::diagnosis::prediction::{Point, range_and_velocity};
+use crate::diagnosis::vector::{difference, dot, norm};
 use crate::radar::Radar;
 
 /// Doppler bins on either side of zero that hold residuals of static clutter.
@@ -41,8 +42,13 @@ impl Template {
     /// Cells of a dense map that hold more than a millionth of its peak.
     fn of(map: &[f32]) -> Self {
         let least = 1e-6 * map.iter().copied().fold(0.0, f32::max);
-        let (cells, power) =
-            map.iter().enumerate().filter(|(_, power)| **power > least).map(|(cell, &power)| (cell as u32, power)).unzip();
+        Self::keeping(map, |_, power| power > least)
+    }
+
+    /// The cells of a dense map that `keep` wants, by their number and power.
+    pub fn keeping(map: &[f32], keep: impl Fn(usize, f32) -> bool) -> Self {
+        let kept = map.iter().enumerate().filter(|&(cell, &power)| keep(cell, power));
+        let (cells, power) = kept.map(|(cell, &power)| (cell as u32, power)).unzip();
         Self { cells, power }
     }
 }
@@ -177,7 +183,7 @@ pub fn part_templates(radar: &Radar, cells: &Cells, points: &[Point], parts: usi
 
 /// What a point at a range would return with a reflectivity of one, and the cosine at which it faces the radar.
 fn power_and_facing(point: &Point, range_m: f64, centre: [f64; 3]) -> (f64, f64) {
-    let to_radar: [f64; 3] = std::array::from_fn(|axis| centre[axis] - point.position_m[axis]);
+    let to_radar = difference(centre, point.position_m);
     let facing = (dot(to_radar, point.normal) / norm(to_radar).max(1e-6)).max(0.0);
     (point.area_m2 / range_m.max(0.1).powi(4), facing)
 }
@@ -247,12 +253,4 @@ fn independent_channels(evidence: &Evidence, expected: &[Vec<f32>]) -> f64 {
     let a = (c - 1.0) / c;
     let rho2 = ((a - ratio * (1.0 + 1.0 / c)) / (a * (1.0 + ratio))).clamp(0.0, 1.0);
     c / (1.0 + (c - 1.0) * rho2)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }

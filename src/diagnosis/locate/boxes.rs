@@ -7,7 +7,7 @@ use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::signed;
 use crate::diagnosis::finding::Place;
 use crate::diagnosis::power::Cells;
-use crate::diagnosis::statistics::{corrected, mean_power_tail};
+use crate::diagnosis::statistics::{corrected, log_sum, mean_power_tail};
 
 /// Share of false boxes among those that are returned.
 const FALSE_SHARE: f64 = 0.05;
@@ -79,8 +79,7 @@ pub fn strongest(evidence: &Evidence, residual: &Residual) -> Option<Strongest> 
         let mean = 1.0 + share * (mean - 1.0);
         held_sum * (1.0 - 1.0 / mean) - held_count * mean.ln()
     });
-    let most = predicted.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let gain = most + (predicted.map(|gain| (gain - most).exp()).iter().sum::<f64>() / SHARES.len() as f64).ln();
+    let gain = log_sum(predicted.into_iter()) - (SHARES.len() as f64).ln();
     let p_value = corrected(mean_power_tail(mean, count.max(0.1)), tried);
     Some(Strongest { region: region(evidence, residual, &Cells::new(&evidence.radar), &found), p_value, gain })
 }

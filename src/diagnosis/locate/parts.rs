@@ -1,6 +1,7 @@
 //! Excess put back onto the body's parts and onto the walls.
 
 use crate::diagnosis::Evidence;
+use crate::diagnosis::power::Template;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::{corrected, mean_power_tail};
 
@@ -21,15 +22,12 @@ pub fn by_part(evidence: &Evidence) -> Vec<Seen> {
     let (Some(body), Some(model), Some(residual)) = (&evidence.body, evidence.power(), Residual::new(evidence)) else {
         return vec![];
     };
-    let maps = (0..body.parts.len()).map(|part| {
-        let per_frame = (0..body.frames.len()).map(|frame| {
-            let map = model.of_parts(frame, |other| other == part);
-            map.iter().enumerate().filter(|(_, power)| **power > 0.0).map(|(cell, &power)| (cell as u32, power)).collect()
-        });
-        (body.parts[part].clone(), per_frame.collect())
+    let parts = (0..body.parts.len()).map(|part| {
+        let per_frame = (0..body.frames.len())
+            .map(|frame| Template::keeping(&model.of_parts(frame, |other| other == part), |_, power| power > 0.0));
+        seen(&residual, body.parts[part].clone(), per_frame)
     });
-    let seen: Vec<Seen> = maps.filter_map(|(name, map): (String, Vec<Vec<(u32, f32)>>)| seen(&residual, name, &map)).collect();
-    adjusted(seen)
+    adjusted(parts.flatten().collect())
 }
 
 /// By boundary of the room, in the cells of the body's image there (one reflection); empty without body or room.
@@ -54,20 +52,20 @@ pub fn by_wall(evidence: &Evidence) -> Vec<Seen> {
             }));
             let support = model.support(frame);
             let least = 1e-3 * map.iter().copied().fold(0.0, f32::max);
-            (0..map.len()).filter(|&cell| map[cell] > least && !support[cell]).map(|cell| (cell as u32, map[cell])).collect()
+            Template::keeping(&map, |cell, power| power > least && !support[cell])
         });
-        seen(&residual, boundary.name().into(), &per_frame.collect::<Vec<Vec<(u32, f32)>>>())
+        seen(&residual, boundary.name().into(), per_frame)
     });
-    let seen = walls.collect();
-    adjusted(seen)
+    adjusted(walls.collect())
 }
 
-fn seen(residual: &Residual, name: String, map: &[Vec<(u32, f32)>]) -> Option<Seen> {
+/// `templates`: of every frame.
+fn seen(residual: &Residual, name: String, templates: impl Iterator<Item = Template>) -> Option<Seen> {
     let (mut sum, mut weight, mut square) = (0.0, 0.0, 0.0);
-    for (frame, cells) in map.iter().enumerate() {
+    for (frame, Template { cells, power }) in templates.enumerate() {
         let (ratios, counts) = (residual.ratio.below([frame]), residual.count.below([frame]));
-        let peak = cells.iter().map(|cell| cell.1).fold(0.0, f32::max).max(f32::MIN_POSITIVE);
-        for &(cell, power) in cells {
+        let peak = power.iter().copied().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+        for (cell, power) in cells.into_iter().zip(power) {
             let own = f64::from(power / peak);
             let count = f64::from(counts[cell as usize]);
             if count > 0.0 {

@@ -4,7 +4,9 @@
 use std::f64::consts::TAU;
 
 use super::Point;
+use crate::diagnosis::vector::{difference, dot, norm};
 use crate::effects;
+use crate::paths::distance;
 use crate::radar::Radar;
 use crate::room::Boundary;
 
@@ -37,7 +39,7 @@ impl Echo {
                 .map(|point| {
                     let (range_m, velocity_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
                     let towards = way(radar, point.position_m);
-                    let cosine = (0..3).map(|axis| towards[axis] * point.normal[axis]).sum::<f64>();
+                    let cosine = dot(towards, point.normal);
                     let spread = coefficient.powi(2) * point.area_m2 / range_m.max(0.1).powi(4);
                     let image = Mirrored { range_m: range_m + extra_m, velocity_mps, spread, cosine };
                     image.in_sight(centre, towards, point.part)
@@ -74,9 +76,9 @@ impl Mirrored {
     fn in_sight(&self, centre_m: [f64; 3], towards: [f64; 3], part: usize) -> Point {
         // Any direction that is not the line of sight.
         let other = if towards[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
-        let along: f64 = (0..3).map(|axis| other[axis] * towards[axis]).sum();
+        let along = dot(other, towards);
         let aside: [f64; 3] = std::array::from_fn(|axis| other[axis] - along * towards[axis]);
-        let length = aside.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+        let length = norm(aside).max(1e-9);
         let (cosine, sine) = (self.cosine, (1.0 - self.cosine * self.cosine).max(0.0).sqrt());
         Point {
             position_m: std::array::from_fn(|axis| centre_m[axis] - towards[axis] * self.range_m),
@@ -102,8 +104,7 @@ pub fn mirrored_return(radar: &Radar, point: &Point, boundary: Boundary, distanc
     let mut far = way(radar, image.position_m);
     far[axis] *= -1.0;
     let half: [f64; 3] = if twice { far } else { std::array::from_fn(|i| near[i] + far[i]) };
-    let length = half.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-    let cosine = (half.iter().zip(point.normal).map(|(a, b)| a * b).sum::<f64>() / length).max(ROUGH);
+    let cosine = (dot(half, point.normal) / norm(half).max(1e-6)).max(ROUGH);
     let (range_m, velocity_mps, spread) = if twice {
         (far_m, far_mps, far_m.powi(-4))
     } else {
@@ -116,10 +117,10 @@ pub fn mirrored_return(radar: &Radar, point: &Point, boundary: Boundary, distanc
 /// Power of a path and the same path backwards over that of one of them, mean over the channels: they are equally long
 /// for antennas at one place, and all the less for those that are apart.
 fn both_ways(radar: &Radar, point_m: [f64; 3], image_m: [f64; 3]) -> f64 {
+    let [point_m, image_m] = [point_m, image_m].map(|at| difference(at, radar.position_m));
     let legs = |antennas: &[[f64; 3]]| -> Vec<f64> {
         // A leg to the point less the leg to its image.
-        let of = |antenna: &[f64; 3]| distance(radar, antenna, point_m) - distance(radar, antenna, image_m);
-        antennas.iter().map(of).collect()
+        antennas.iter().map(|&antenna| distance(point_m, antenna) - distance(image_m, antenna)).collect()
     };
     let (sent, received) = (legs(&radar.tx_m), legs(&radar.rx_m));
     let number = TAU / radar.wavelength_m();
@@ -127,17 +128,14 @@ fn both_ways(radar: &Radar, point_m: [f64; 3], image_m: [f64; 3]) -> f64 {
     sum / (sent.len() * received.len()) as f64
 }
 
-fn distance(radar: &Radar, antenna: &[f64; 3], to_m: [f64; 3]) -> f64 {
-    (0..3).map(|axis| (to_m[axis] - radar.position_m[axis] - antenna[axis]).powi(2)).sum::<f64>().sqrt()
-}
-
 /// Mean of the legs to all antennas, and how fast it grows.
 pub fn range_and_velocity(radar: &Radar, position_m: [f64; 3], velocity_mps: [f64; 3]) -> (f64, f64) {
+    let from_radar = difference(position_m, radar.position_m);
     let mean = |antennas: &[[f64; 3]]| {
-        let (range, speed) = antennas.iter().fold((0.0, 0.0), |(range, speed), antenna| {
-            let offset: [f64; 3] = std::array::from_fn(|axis| position_m[axis] - radar.position_m[axis] - antenna[axis]);
-            let length = offset.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-            (range + length, speed + offset.iter().zip(velocity_mps).map(|(a, b)| a * b).sum::<f64>() / length)
+        let (range, speed) = antennas.iter().fold((0.0, 0.0), |(range, speed), &antenna| {
+            let offset = difference(from_radar, antenna);
+            let length = norm(offset).max(1e-6);
+            (range + length, speed + dot(offset, velocity_mps) / length)
         });
         (range / antennas.len() as f64, speed / antennas.len() as f64)
     };
@@ -147,9 +145,8 @@ pub fn range_and_velocity(radar: &Radar, position_m: [f64; 3], velocity_mps: [f6
 
 /// Unit vector to the radar.
 fn way(radar: &Radar, from_m: [f64; 3]) -> [f64; 3] {
-    let centre = radar.centre_m();
-    let way: [f64; 3] = std::array::from_fn(|axis| centre[axis] - from_m[axis]);
-    let length = way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+    let way = difference(radar.centre_m(), from_m);
+    let length = norm(way).max(1e-6);
     way.map(|x| x / length)
 }
 

@@ -2,6 +2,7 @@
 
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::prediction::BodyPrediction;
+use crate::diagnosis::vector::{difference, dot, norm};
 use crate::room::{Boundary, Room};
 
 /// Half of the angle between neighbouring points of the body, radians.
@@ -28,8 +29,8 @@ pub fn seen(evidence: &Evidence, body: &BodyPrediction, range_m: f64, reach_m: f
             .iter()
             .step_by(points.len().div_ceil(MOST_POINTS).max(1))
             .map(|point| {
-                let away: Direction = std::array::from_fn(|axis| point.position_m[axis] - centre[axis]);
-                let range = dot(away, away).sqrt().max(1e-6);
+                let away = difference(point.position_m, centre);
+                let range = norm(away).max(1e-6);
                 (away.map(|x| x / range), range)
             })
             .collect();
@@ -65,8 +66,8 @@ fn directions(room: &Room, centre: Direction, range_m: f64, reach_m: f64) -> Vec
                 at[axis] = sign * distance;
                 at[u] = low[u] + i as f64 * STEP_M;
                 at[v] = low[v] + j as f64 * STEP_M;
-                let away: Direction = std::array::from_fn(|axis| at[axis] - centre[axis]);
-                let range = dot(away, away).sqrt();
+                let away = difference(at, centre);
+                let range = norm(away);
                 if away[1] > 0.0 && (range - range_m).abs() < reach_m {
                     found.push(away.map(|x| x / range));
                 }
@@ -74,8 +75,4 @@ fn directions(room: &Room, centre: Direction, range_m: f64, reach_m: f64) -> Vec
         }
     }
     found
-}
-
-fn dot(a: Direction, b: Direction) -> f64 {
-    (0..3).map(|axis| a[axis] * b[axis]).sum()
 }

@@ -1,11 +1,9 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::prediction::{BodyPrediction, Point};
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
-use crate::support;
 
 const FRAMES: usize = 16;
 const FRONT_M: f64 = 5.0;
@@ -19,20 +17,7 @@ fn covers(frame: usize) -> bool {
 fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
     let mut radar = Radar::small(FRAMES);
     (radar.loops_per_frame, radar.samples_per_chirp) = (16, 128);
-    let dims = radar.dims();
-    let mut normal = support::normal(seed);
     let ranges = [1.2, 4.2, FRONT_M];
-    let block = dims[3] * dims[4];
-    let samples = (0..dims.iter().product::<usize>())
-        .map(|i| {
-            let (frame, channel, n) = (i / (dims[1] * dims[2] * block), i / block % (dims[1] * dims[2]), i % dims[4]);
-            let returns = ranges.iter().enumerate().map(|(index, range)| {
-                let cycles = 2.0 * range / SPEED_OF_LIGHT * radar.slope_hz_per_s / radar.sample_rate_hz;
-                Complex64::cis(TAU * cycles * n as f64 + (index * 3 + channel * (index + 1)) as f64) * change(index, frame)
-            });
-            returns.sum::<Complex64>() + Complex64::new(normal(), normal())
-        })
-        .collect();
     let starts_s: Vec<f64> = (0..FRAMES).map(|frame| radar.chirp_time_s(frame, 0, 0)).collect();
     let points = |frame: usize| {
         let side_m = if covers(frame) { 0.0 } else { 0.7 };
@@ -52,8 +37,16 @@ fn evidence(seed: u64, change: impl Fn(usize, usize) -> Complex64) -> Evidence {
         ..BodyPrediction::default()
     };
     let room = Room { front_m: Some(FRONT_M), floor_m: Some(1.2), ..Room::default() };
-    let loaded = Loaded::of_samples(radar, samples, [-100.0, 100.0]);
-    Evidence::new(loaded, Some(room), Some(body))
+    let cycles_per_m = 2.0 / SPEED_OF_LIGHT * radar.slope_hz_per_s / radar.sample_rate_hz;
+    let mut evidence = Evidence::in_noise(radar, seed, |[frame, channel, _, n]| {
+        let returns = ranges.iter().enumerate().map(|(index, range)| {
+            let phase = TAU * cycles_per_m * range * n as f64 + (index * 3 + channel * (index + 1)) as f64;
+            Complex64::cis(phase) * change(index, frame)
+        });
+        returns.sum()
+    });
+    (evidence.room, evidence.body) = (Some(room), Some(body));
+    evidence
 }
 
 #[test]

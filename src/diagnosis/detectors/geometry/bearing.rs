@@ -4,7 +4,6 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::diagnosis::statistics;
 use crate::radar::Radar;
@@ -89,13 +88,9 @@ pub fn bearing(radar: &Radar, training: &[Sums]) -> Bearing {
     let sine = -over(&|phase, x| phase.value * x) / (spread * wave);
     // One direction for all: its error from those of the phases, as if they erred together.
     let deviation = over(&|phase, x| phase.deviation * x.abs()) / (spread * wave);
-    let own = tail((sine.abs() - PHASE_FLOOR_RAD / PI) / deviation.max(1e-12), training.len() as f64 - 1.0);
+    let excess = (sine.abs() - PHASE_FLOOR_RAD / PI).max(0.0);
+    let own = (2.0 * statistics::student_tail(excess / deviation.max(1e-12), training.len() as f64 - 1.0)).min(1.0);
     Bearing { sine, deviation, p_value: statistics::corrected(own, 2.0 * receivers as f64) }
-}
-
-/// Two-sided, of Student's law.
-fn tail(t: f64, freedom: f64) -> f64 {
-    if t <= 0.0 { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t)) }
 }
 
 /// Phase of a receiver against the first, radians.

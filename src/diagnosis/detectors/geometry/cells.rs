@@ -10,7 +10,9 @@ use super::numbers::Numbers;
 use crate::diagnosis::power::PowerModel;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::speckle;
+use crate::diagnosis::vector::sine;
 use crate::diagnosis::{BodyPrediction, Evidence};
+use crate::paths::distance;
 use crate::radar::Radar;
 
 /// Expected power over the noise, noise included, from which on a cell is used.
@@ -123,13 +125,9 @@ fn cells(
     for point in body.with_echoes(radar, body.frames[frame].clone(), None) {
         let (range_m, velocity_mps) = range_and_velocity(radar, point.position_m, point.velocity_mps);
         let peak = model.peak(radar, point);
-        let distance = |from: [f64; 3]| (0..3).map(|axis| (point.position_m[axis] - from[axis]).powi(2)).sum::<f64>().sqrt();
-        let sine = (point.position_m[0] - centre[0]) / distance(centre).max(1e-6);
-        let turns: Vec<Complex64> = radar
-            .rx_m
-            .iter()
-            .map(|rx| Complex64::cis(wave * distance(std::array::from_fn(|axis| rx[axis] + radar.position_m[axis]))))
-            .collect();
+        let sine = sine(point.position_m, centre);
+        let turns: Vec<Complex64> =
+            (0..receivers).map(|rx| Complex64::cis(wave * distance(point.position_m, radar.rx_position_m(rx)))).collect();
         model.cells.each(range_m, velocity_mps, |cell, share| {
             let power = peak * f64::from(share);
             if slots[cell] == usize::MAX || power <= 0.0 {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::diagnosis::finding::Correction;
 use crate::diagnosis::prediction::{BodyPrediction, Centre, Echo, Point};
+use crate::diagnosis::vector::{difference, norm};
 
 /// One of the effects that move the body in the maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +60,8 @@ impl Moves {
 
     /// Where something is seen after a change of place.
     fn moved(&self, position_m: [f64; 3], change: Change) -> [f64; 3] {
-        let sight: [f64; 3] = std::array::from_fn(|axis| position_m[axis] - self.centre_m[axis]);
-        let range = sight.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+        let sight = difference(position_m, self.centre_m);
+        let range = norm(sight).max(1e-6);
         let shift: [f64; 3] = match change {
             Change::Range(offset) => sight.map(|x| x / range * offset),
             Change::Scale(relative) => sight.map(|x| x * relative),

@@ -21,6 +21,7 @@ use crate::diagnosis::power::{PowerModel, part_templates};
 use crate::diagnosis::statistics::UNDECIDED;
 use crate::diagnosis::{BodyPrediction, Candidate, Estimate, Evidence, Place};
 use crate::effects::{self, Stage};
+use crate::paths::distance;
 
 /// Expected power over the noise from which on a cell is used.
 const LEAST_POWER: f32 = 10.0;
@@ -125,7 +126,7 @@ fn sums(evidence: &Evidence, model: &PowerModel, body: &BodyPrediction, clutter_
     let points = &body.frames[frame];
     let (centre, wave) = (radar.centre_m(), TAU / radar.wavelength_m());
     // Mean direction and range of each cell: templates weighted with them. The centre may lie aside: sines need no care.
-    let range = |position: [f64; 3]| (0..3).map(|axis| (position[axis] - centre[axis]).powi(2)).sum::<f64>().sqrt().max(1e-6);
+    let range = |position: [f64; 3]| distance(position, centre).max(1e-6);
     let mean = |of: &dyn Fn([f64; 3]) -> f64| -> Vec<f32> {
         let shifted: Vec<_> = points
             .iter()

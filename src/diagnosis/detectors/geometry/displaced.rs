@@ -5,8 +5,6 @@
 //! power model does not know shifts the body by up to 4 mm and 1.4 ms (practice recordings without any such effect, which also
 //! helped to choose the lobes and these floors): a change must exceed these floors, frame after frame.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::change::{Change, Moves, frame_period_s};
 use super::fitted::{Fitted, refine};
 use super::lost::{is_step, lost_frames, predicted, ratio_p_value, step_p_value};
@@ -15,9 +13,10 @@ use super::trial::{Score, Trial};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::clutter::energy_beyond_noise;
 use crate::diagnosis::detectors::description::Description;
-use crate::diagnosis::statistics::UNDECIDED;
+use crate::diagnosis::statistics::{UNDECIDED, corrected, student_tail};
 use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{Stage, clock_drift, clock_offset, frame_drop, pose_offset, range_bias, slope_error};
+use crate::paths::distance;
 
 /// Errors of the prediction that are no finding: metres of range, seconds.
 const RANGE_FLOOR_M: f64 = 4e-3;
@@ -179,17 +178,13 @@ fn p_value(fit: &Fitted, null: &Score, training: &[usize]) -> f64 {
     if freedom < 3.0 || !t.is_finite() {
         return 1.0;
     }
-    let tail = StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| 2.0 * law.sf(t.max(0.0)));
-    crate::diagnosis::statistics::corrected(tail.min(1.0), KINDS)
+    corrected((2.0 * student_tail(t, freedom)).min(1.0), KINDS)
 }
 
 fn mean_range_m(trial: &Trial) -> f64 {
     let centre = trial.evidence.radar.centre_m();
     let points = trial.evidence.body.iter().flat_map(|body| body.frames.iter().flatten());
-    let (sum, count) = points.fold((0.0, 0usize), |(sum, count), point| {
-        let square: f64 = (0..3).map(|axis| (point.position_m[axis] - centre[axis]).powi(2)).sum();
-        (sum + square.sqrt(), count + 1)
-    });
+    let (sum, count) = points.fold((0.0, 0usize), |(sum, count), point| (sum + distance(point.position_m, centre), count + 1));
     (sum / count.max(1) as f64).max(0.1)
 }
 

@@ -8,6 +8,7 @@ use num_complex::Complex64;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::spectrum;
+use crate::diagnosis::power::hann_power;
 use crate::paths::distance;
 use crate::scatterers::room_patches::RoomPatchesConfig;
 
@@ -70,7 +71,7 @@ impl WallBearings {
         let cell = |bin: usize| -> Option<Cell> {
             let mut expected = DMatrix::<Complex64>::zeros(receivers, receivers);
             for (at, power, phases) in sources.iter().filter(|source| (source.0 - bin as f64).abs() < REACH) {
-                expected += phases * phases.adjoint() * Complex64::from(power * leaked(at - bin as f64));
+                expected += phases * phases.adjoint() * Complex64::from(power * hann_power(at - bin as f64));
             }
             let power = expected.trace().re / receivers as f64;
             let observed: Vec<DVector<Complex64>> =
@@ -102,10 +103,4 @@ impl WallBearings {
         };
         self.cells.iter().map(of_cell).sum()
     }
-}
-
-/// Power that a Hann window lets through at so many bins aside.
-fn leaked(bins: f64) -> f64 {
-    let sinc = |x: f64| if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) };
-    (sinc(bins) + 0.5 * (sinc(bins - 1.0) + sinc(bins + 1.0))).powi(2)
 }

@@ -57,10 +57,7 @@ fn rate(radar: &Radar, extra_m: f64) -> f64 {
 fn later(scene: &Scene, extra_m: f64) -> Vec<Match> {
     let (samples, rate) = (scene.samples, rate(&scene.evidence.radar, extra_m));
     matches(scene, |frame, channel| {
-        let copy: Vec<Complex64> = (scene.evidence.moving(frame, channel).iter().enumerate())
-            .map(|(i, value)| value * Complex64::cis(rate * (i % samples) as f64))
-            .collect();
-        let mut map = transform(&copy, samples);
+        let mut map = delayed(scene, frame, channel, rate);
         for (cell, value) in map.iter_mut().enumerate() {
             // The copy's noise is no template.
             let source = (cell % samples) as f64 - extra_m * scene.model.cells.bins_per_m;
@@ -138,7 +135,7 @@ fn shifted_matches(scene: &Scene, shifts: usize) -> Vec<Vec<Match>> {
             let sources: Vec<usize> = (0..support.len()).filter(|&cell| support[cell] && scene.map(frame)[cell] > 4.0).collect();
             for (channel, noise) in noise.iter().enumerate() {
                 let map = scene.evidence.range_doppler(frame, channel);
-                let between = half_cell_later(scene, frame, channel);
+                let between = delayed(scene, frame, channel, std::f64::consts::PI / samples as f64);
                 for &source in &sources {
                     let (row, range) = (source / samples * samples, source % samples);
                     for shift in 1..=shifts {
@@ -160,11 +157,9 @@ fn shifted_matches(scene: &Scene, shifts: usize) -> Vec<Vec<Match>> {
         .collect()
 }
 
-/// The moving part's map if everything were half a cell farther.
-fn half_cell_later(scene: &Scene, frame: usize, channel: usize) -> Vec<Complex64> {
-    let samples = scene.samples;
-    let copy: Vec<Complex64> = (scene.evidence.moving(frame, channel).iter().enumerate())
-        .map(|(i, value)| value * Complex64::cis(std::f64::consts::PI * (i % samples) as f64 / samples as f64))
-        .collect();
-    transform(&copy, samples)
+/// The moving part's map if everything were farther by so much phase per sample.
+fn delayed(scene: &Scene, frame: usize, channel: usize, rate: f64) -> Vec<Complex64> {
+    let mut moving = scene.evidence.moving(frame, channel);
+    moving.iter_mut().enumerate().for_each(|(i, value)| *value *= Complex64::cis(rate * (i % scene.samples) as f64));
+    transform(&moving, scene.samples)
 }

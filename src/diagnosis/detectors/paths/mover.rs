@@ -4,10 +4,11 @@ use super::oscillation::Oscillation;
 use super::removal::{emptied, patch};
 use super::scene::Scene;
 use super::track::{Sighting, Track};
-use super::whereabouts::{Whereabouts, bounds};
+use super::whereabouts::Whereabouts;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::power::Template;
-use crate::diagnosis::statistics::{corrected, median};
+use crate::diagnosis::statistics::{bounds, corrected, median};
+use crate::diagnosis::vector::sine;
 use crate::diagnosis::{Candidate, Estimate, Place};
 use crate::effects::{self, Stage};
 use crate::radar::Radar;
@@ -170,11 +171,7 @@ pub fn aside(scene: &Scene, sightings: &[Sighting]) -> bool {
     let Some(body) = &scene.evidence.body else { return false };
     let centre = scene.evidence.radar.centre_m();
     let apart = |sighting: &&Sighting| {
-        let sines = body.frames[sighting.frame].iter().map(|point| {
-            let way: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - centre[axis]);
-            way[0] / way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6)
-        });
-        let [low, high] = bounds(sines);
+        let [low, high] = bounds(body.frames[sighting.frame].iter().map(|point| sine(point.position_m, centre)));
         sighting.sine.is_some_and(|sine| sine < low - APART || sine > high + APART)
     };
     3 * sightings.iter().filter(apart).count() > 2 * sightings.len()

@@ -1,9 +1,13 @@
 //! A sinusoidal radial motion through sightings: mean range, excursion and rate.
 
+use nalgebra::{Cholesky, Matrix3, U3, Vector3};
+
 use super::track::Sighting;
 
 /// Highest rate that is tried; faster ones blur within a frame.
 const FASTEST_HZ: f64 = 8.0;
+/// Least pivot of normal equations over the first: what has less is not determined.
+const LEAST_PIVOT: f64 = 1e-12;
 
 /// range(t) = mean + sine · sin(ω t) + cosine · cos(ω t).
 #[derive(Clone, Copy, Debug)]
@@ -102,57 +106,37 @@ fn unwrapped(
 ) -> ([f64; 3], f64) {
     let rows = |time: f64| {
         let (sine, cosine) = (omega * time).sin_cos();
-        ([1.0, sine, cosine], [0.0, omega * cosine, -omega * sine])
+        (Vector3::new(1.0, sine, cosine), Vector3::new(0.0, omega * cosine, -omega * sine))
     };
     let mut best = ([0.0; 3], f64::INFINITY);
     let mut velocities: Vec<f64> = sightings.iter().map(|s| s.velocity_mps).collect();
     for weights in [first, errors, errors, errors] {
-        let (mut matrix, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for ((sighting, &time), &velocity) in sightings.iter().zip(times_s).zip(&velocities) {
             let (range, rate) = rows(time);
             for (row, value, error) in [(range, sighting.range_m, weights[0]), (rate, velocity, weights[1])] {
-                let weight = error.powi(-2);
-                for i in 0..3 {
-                    right[i] += weight * row[i] * value;
-                    for j in 0..3 {
-                        matrix[i][j] += weight * row[i] * row[j];
-                    }
-                }
+                let weighted = row * error.powi(-2);
+                right += weighted * value;
+                normal += weighted * row.transpose();
             }
         }
-        let Some(solution) = solve3(matrix, right) else { break };
-        let dot = |row: [f64; 3]| row.iter().zip(&solution).map(|(a, b)| a * b).sum::<f64>();
+        let determined = |factor: &Cholesky<f64, U3>| {
+            factor.l_dirty().diagonal().iter().all(|root| root * root >= LEAST_PIVOT * normal.m11.max(1.0))
+        };
+        let Some(factor) = normal.cholesky().filter(determined) else { break };
+        let solution = factor.solve(&right);
         let mut chi2 = 0.0;
         for ((sighting, &time), velocity) in sightings.iter().zip(times_s).zip(&mut velocities) {
             let (range, rate) = rows(time);
-            *velocity = sighting.velocity_mps + span_mps * ((dot(rate) - sighting.velocity_mps) / span_mps).round();
-            chi2 += ((sighting.range_m - dot(range)) / errors[0]).powi(2) + ((*velocity - dot(rate)) / errors[1]).powi(2);
+            *velocity = sighting.velocity_mps + span_mps * ((rate.dot(&solution) - sighting.velocity_mps) / span_mps).round();
+            chi2 += ((sighting.range_m - range.dot(&solution)) / errors[0]).powi(2)
+                + ((*velocity - rate.dot(&solution)) / errors[1]).powi(2);
         }
         if chi2 < best.1 {
-            best = (solution, chi2);
+            best = (solution.into(), chi2);
         }
     }
     best
-}
-
-fn solve3(mut matrix: [[f64; 3]; 3], mut right: [f64; 3]) -> Option<[f64; 3]> {
-    for i in 0..3 {
-        let pivot = matrix[i][i];
-        if pivot.abs() < 1e-12 * matrix[0][0].abs().max(1.0) {
-            return None;
-        }
-        for j in i + 1..3 {
-            let factor = matrix[j][i] / pivot;
-            let upper = matrix[i];
-            matrix[j].iter_mut().zip(upper).for_each(|(value, above)| *value -= factor * above);
-            right[j] -= factor * right[i];
-        }
-    }
-    for i in (0..3).rev() {
-        let rest: f64 = (i + 1..3).map(|k| matrix[i][k] * right[k]).sum();
-        right[i] = (right[i] - rest) / matrix[i][i];
-    }
-    Some(right)
 }
 
 #[cfg(test)]

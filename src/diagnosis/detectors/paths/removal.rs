@@ -1,5 +1,6 @@
 //! Taking what some cells of the range-Doppler maps hold out of the samples.
 
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::diagnosis::evidence::{hann, transform};
@@ -25,7 +26,7 @@ fn empty_cells(cube: &mut Cube, clutter: &[Complex64], frame: usize, cells: &[us
     }
     let [_, _, _, loops, samples] = cube.dims;
     let (slow, fast) = (hann(loops), hann(samples));
-    let Some(factor) = cholesky(&gram(cells, &slow, &fast), cells.len()) else { return };
+    let Some(factor) = gram(cells, &slow, &fast).cholesky() else { return };
     for channel in 0..cube.channels() {
         let clutter = &clutter[channel * samples..][..samples];
         let moving: Vec<Complex64> = cube
@@ -34,9 +35,9 @@ fn empty_cells(cube: &mut Cube, clutter: &[Complex64], frame: usize, cells: &[us
             .flat_map(|chirp| chirp.iter().zip(clutter).map(|(value, mean)| value - mean))
             .collect();
         let map = transform(&moving, samples);
-        let amounts = solve(&factor, cells.iter().map(|&cell| map[cell]).collect());
+        let amounts = factor.solve(&DVector::from_iterator(cells.len(), cells.iter().map(|&cell| map[cell])));
         let found = cube.channel_mut(frame, channel);
-        for (cell, amount) in cells.iter().zip(amounts) {
+        for (cell, amount) in cells.iter().zip(&amounts) {
             let (doppler, range) = (cell / samples, cell % samples);
             let tone: Vec<Complex64> = (0..samples).map(|n| turn(range * n, samples) * fast[n]).collect();
             for (i, (window, chirp)) in slow.iter().zip(found.chunks_exact_mut(samples)).enumerate() {
@@ -72,8 +73,8 @@ fn turn(step: usize, length: usize) -> Complex64 {
     Complex64::cis(std::f64::consts::TAU * (step % length) as f64 / length as f64)
 }
 
-/// Inner products of the cells' windowed tones, with a small ridge, row by row.
-fn gram(cells: &[usize], slow: &[f64], fast: &[f64]) -> Vec<Complex64> {
+/// Inner products of the cells' windowed tones, with a small ridge.
+fn gram(cells: &[usize], slow: &[f64], fast: &[f64]) -> DMatrix<Complex64> {
     let (loops, samples) = (slow.len(), fast.len());
     let along = |window: &[f64]| -> Vec<Complex64> {
         let length = window.len();
@@ -82,50 +83,12 @@ fn gram(cells: &[usize], slow: &[f64], fast: &[f64]) -> Vec<Complex64> {
             .collect()
     };
     let (slow, fast) = (along(slow), along(fast));
-    let count = cells.len();
-    let mut gram = vec![Complex64::ZERO; count * count];
-    for (i, a) in cells.iter().enumerate() {
-        for (j, b) in cells.iter().enumerate() {
-            let doppler = (a / samples + loops - b / samples) % loops;
-            let range = (a % samples + samples - b % samples) % samples;
-            gram[i * count + j] = slow[doppler] * fast[range];
-        }
-        gram[i * count + i] += LEAST;
-    }
-    gram
-}
-
-/// Lower triangle of a Hermitian positive matrix's factor.
-fn cholesky(matrix: &[Complex64], size: usize) -> Option<Vec<Complex64>> {
-    let mut lower = vec![Complex64::ZERO; size * size];
-    for i in 0..size {
-        for j in 0..=i {
-            let dot: Complex64 = (0..j).map(|k| lower[i * size + k] * lower[j * size + k].conj()).sum();
-            let rest = matrix[i * size + j] - dot;
-            lower[i * size + j] = if i == j {
-                if rest.re <= 0.0 {
-                    return None;
-                }
-                Complex64::from(rest.re.sqrt())
-            } else {
-                rest / lower[j * size + j]
-            };
-        }
-    }
-    Some(lower)
-}
-
-fn solve(lower: &[Complex64], mut right: Vec<Complex64>) -> Vec<Complex64> {
-    let size = right.len();
-    for i in 0..size {
-        let dot: Complex64 = (0..i).map(|k| lower[i * size + k] * right[k]).sum();
-        right[i] = (right[i] - dot) / lower[i * size + i];
-    }
-    for i in (0..size).rev() {
-        let dot: Complex64 = (i + 1..size).map(|k| lower[k * size + i].conj() * right[k]).sum();
-        right[i] = (right[i] - dot) / lower[i * size + i];
-    }
-    right
+    DMatrix::from_fn(cells.len(), cells.len(), |i, j| {
+        let (a, b) = (cells[i], cells[j]);
+        let doppler = (a / samples + loops - b / samples) % loops;
+        let range = (a % samples + samples - b % samples) % samples;
+        slow[doppler] * fast[range] + if i == j { LEAST } else { 0.0 }
+    })
 }
 
 #[cfg(test)]

@@ -183,11 +183,7 @@ impl<'a> Scene<'a> {
     pub fn visible(&self, frame: usize, map: &[f32]) -> Template {
         let taken = self.taken(frame);
         let least = 1e-3f32.max(1e-4 * map.iter().copied().fold(0.0, f32::max));
-        let (cells, power) = (map.iter().enumerate())
-            .filter(|(cell, power)| **power > least && !taken[*cell])
-            .map(|(cell, &power)| (cell as u32, power))
-            .unzip();
-        Template { cells, power }
+        Template::keeping(map, |cell, power| power > least && !taken[cell])
     }
 
     /// The part of a template whose Doppler is not that of static clutter.

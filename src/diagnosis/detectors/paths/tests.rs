@@ -10,6 +10,7 @@ use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::misfit::Misfit;
 use crate::diagnosis::{BodyPrediction, Candidate, Cube, Evidence, Point, Split};
 use crate::effects;
+use crate::paths::distance;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 use crate::room::Room;
 
@@ -30,10 +31,6 @@ fn path(cube: &mut Cube, radar: &Radar, frame: usize, rx: usize, length: (f64, f
             value *= turn;
         }
     }
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Body walking away, with a mirror on the right, an oscillating untracked mover before it, or neither.

@@ -3,7 +3,7 @@
 use super::oscillation::Oscillation;
 use super::scene::Scene;
 use super::track::Sighting;
-use crate::diagnosis::statistics::median;
+use crate::diagnosis::statistics::{bounds, median};
 use crate::diagnosis::{Estimate, Place};
 use crate::effects::Stage;
 use crate::radar::Radar;
@@ -108,10 +108,6 @@ impl Whereabouts {
         let Some(direction) = &self.direction else { return String::new() };
         format!(" at {:.0}° azimuth (its height is not seen)", direction.azimuth().to_degrees())
     }
-}
-
-pub fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 fn around(value: f64, error: f64) -> [f64; 2] {

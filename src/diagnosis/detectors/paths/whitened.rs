@@ -10,6 +10,7 @@ use super::scene::CLUTTER_BINS;
 use crate::diagnosis::detectors::steering::steering;
 use crate::diagnosis::prediction::range_and_velocity;
 use crate::diagnosis::statistics::median;
+use crate::diagnosis::vector::sine;
 use crate::grid::Grid;
 
 /// Draws of coloured noise, and fine cells to either side, from which it is estimated how much of a tone stays.
@@ -52,8 +53,7 @@ fn expected(returns: &Returns, frame: usize, sines: &[f64], share: &Grid<f32, 2>
     let mut beams = vec![vec![0.0f32; scene.size()]; sines.len()];
     for (point, level) in returns.body(frame) {
         let (range_m, velocity) = range_and_velocity(radar, point.position_m, point.velocity_mps);
-        let way: [f64; 3] = std::array::from_fn(|axis| point.position_m[axis] - centre[axis]);
-        let sine = way[0] / way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+        let sine = sine(point.position_m, centre);
         scene.model.cells.deposit(&mut map, range_m, velocity, *level);
         for (beam, &towards) in beams.iter_mut().zip(sines) {
             let sum: Complex64 = steering(radar, towards - sine).iter().sum();

@@ -10,7 +10,7 @@ use super::support::{beat_hz, energy, range_m};
 use super::zero_beat::shortest_m;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{chi2_tail, corrected, deviation_at_top};
 use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
@@ -168,9 +168,8 @@ impl Term {
             .log10();
         let rate = evidence.radar.sample_rate_hz;
         let range = range_m(evidence, turns * rate);
-        let step = beat_hz(evidence, 0.002) / rate;
-        let curvature = (2.0 * likelihood(turns) - likelihood(turns + step) - likelihood(turns - step)) / (0.002f64 * 0.002);
-        let error = if curvature > 0.0 { curvature.recip().sqrt() } else { 0.05 }.max(5e-4);
+        let nats = |further_m: f64| likelihood(turns + beat_hz(evidence, further_m) / rate);
+        let error = deviation_at_top(nats, 0.0, likelihood(turns), 0.002).unwrap_or(0.05).max(5e-4);
         // A board has more than one path, within its own size.
         let reach = (1.645 * error).max(BOARD_M);
         // One level stands for channels that differ.

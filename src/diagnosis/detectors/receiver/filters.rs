@@ -1,9 +1,7 @@
 //! The responses of the library that the intermediate frequency may have, and their action on a chirp.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
-use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
 use crate::diagnosis::finding::Estimate;
@@ -118,29 +116,4 @@ pub fn decay(turns_per_sample: f64, power: i32, samples: usize, amplitude: f64) 
             Complex64::from(amplitude * (TAU * turns).powi(power) * (-TAU * turns).exp())
         })
         .collect()
-}
-
-/// A multiplication of a chirp's DFT.
-pub struct Filter {
-    response: Vec<Complex64>,
-    forward: Arc<dyn hybridsim_fft::Fft<f64>>,
-    inverse: Arc<dyn hybridsim_fft::Fft<f64>>,
-}
-
-impl Filter {
-    pub fn new(response: &[Complex64]) -> Self {
-        let mut planner = FftPlanner::new();
-        let samples = response.len();
-        Self {
-            response: response.iter().map(|h| h / samples as f64).collect(),
-            forward: planner.plan_fft_forward(samples),
-            inverse: planner.plan_fft_inverse(samples),
-        }
-    }
-
-    pub fn apply(&self, chirp: &mut [Complex64]) {
-        self.forward.process(chirp);
-        chirp.iter_mut().zip(&self.response).for_each(|(value, h)| *value *= h);
-        self.inverse.process(chirp);
-    }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::Evidence;
 use crate::diagnosis::evidence::beat::empty_bins;
-use crate::diagnosis::evidence::transform;
+use crate::diagnosis::evidence::{hann, transform};
 use crate::diagnosis::locate::Residual;
 use crate::diagnosis::power::{CLUTTER_BINS, Cells};
 use crate::diagnosis::statistics::median;
@@ -149,6 +149,29 @@ fn neighbours([doppler, range]: [usize; 2], between: [usize; 2]) -> impl Iterato
 /// Of amplitude 1, at a sample of a chirp of a frame.
 pub fn tone(slow: f64, fast: f64, chirp: usize, sample: usize) -> Complex64 {
     Complex64::cis(TAU * (slow * chirp as f64 + fast * sample as f64))
+}
+
+/// Of each chirp, the amplitude at a beat frequency (turns per sample), under a Hann window.
+pub fn in_chirps(chirps: &[Complex64], samples: usize, fast: f64) -> Vec<Complex64> {
+    let window = hann(samples);
+    let all: f64 = window.iter().sum();
+    let turns: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64) * (window[n] / all)).collect();
+    chirps.chunks_exact(samples).map(|chirp| chirp.iter().zip(&turns).map(|(value, turn)| value * turn).sum()).collect()
+}
+
+/// Of amplitudes by chirp, the one that turns so from chirp to chirp, under a Hann window.
+pub fn along(amplitudes: &[Complex64], slow: f64) -> Complex64 {
+    turned_back(amplitudes, 1, slow)[0] / hann(amplitudes.len()).iter().sum::<f64>()
+}
+
+/// Sum of chirps under a Hann window over the loops, each turned back by how far a tone (turns per chirp) has turned in it.
+pub fn turned_back(chirps: &[Complex64], samples: usize, slow: f64) -> Vec<Complex64> {
+    let mut sum = vec![Complex64::ZERO; samples];
+    for (index, (chirp, weight)) in chirps.chunks_exact(samples).zip(hann(chirps.len() / samples)).enumerate() {
+        let turn = Complex64::cis(-TAU * slow * index as f64) * weight;
+        sum.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * turn);
+    }
+    sum
 }
 
 #[cfg(test)]

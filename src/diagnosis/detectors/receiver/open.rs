@@ -1,17 +1,16 @@
 //! Receiver fields of recordings whose room is unknown, or without quadrature: an offset, a leakage that dwarfs what is
 //! near. Without a room, only what stands out by its shape can be named.
 
-use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::additive_term::{added, digits, gain};
-use super::support::{range_m, ranges_m, tone};
+use super::support::{powers, range_m, ranges_m, tone};
 use super::transient::{self, NEAR_M};
 use super::zero_beat::ZeroBeat;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::finding::{Candidate, Estimate, Place};
-use crate::diagnosis::statistics::{chi2_tail, corrected};
+use crate::diagnosis::statistics::{chi2_tail, corrected, decibels};
 use crate::diagnosis::{Evidence, denoised};
 use crate::effects::{self, Stage};
 
@@ -110,7 +109,7 @@ impl Near {
     fn find(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Self> {
         let [_, _, _, loops, samples] = evidence.cube.dims;
         let long = samples * ZERO_PADDING;
-        let spectra = spectra(clutter);
+        let spectra: Vec<Vec<f64>> = clutter.iter().map(|chirp| powers(chirp, ZERO_PADDING)).collect();
         let mean: Vec<f64> = (0..long).map(|bin| spectra.iter().map(|s| s[bin]).sum::<f64>() / spectra.len() as f64).collect();
         let bin_m = range_m(evidence, evidence.radar.sample_rate_hz / long as f64);
         let near = (NEAR_M / bin_m).floor() as usize;
@@ -159,28 +158,6 @@ impl Near {
             .map(|bin| self.spread(bin));
         rank_chance(self.spread(self.peak), reflectors)
     }
-}
-
-fn decibels(ratio: f64) -> f64 {
-    10.0 * ratio.max(1e-30).log10()
-}
-
-/// Powers under a Hann window, zero-padded, `[channel][bin]`.
-fn spectra(clutter: &[Vec<Complex64>]) -> Vec<Vec<f64>> {
-    let samples = clutter[0].len();
-    let window = hann(samples);
-    let long = samples * ZERO_PADDING;
-    clutter
-        .iter()
-        .map(|chirp| {
-            let mut padded = vec![Complex64::ZERO; long];
-            for n in 0..samples {
-                padded[n] = chirp[n] * window[n];
-            }
-            FftPlanner::new().plan_fft_forward(long).process(&mut padded);
-            padded.iter().map(Complex64::norm_sqr).collect()
-        })
-        .collect()
 }
 
 fn leakage(evidence: &Evidence, clutter: &[Vec<Complex64>]) -> Option<Candidate> {

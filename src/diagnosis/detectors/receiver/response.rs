@@ -4,20 +4,19 @@
 //! room's delays: what is measured must lie in H · U, with U the space of the room's tones. No knowledge of the scene
 //! inside is needed. A filter that starts from rest leaves a decaying transient at the chirp's beginning instead.
 
-use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::field::{Field, add, orthonormal};
-use super::filters::{Filter, SHAPES, Shape, decay};
-use super::support::{beat_hz, dot, tone};
+use super::filters::{SHAPES, Shape, decay};
+use super::support::{beat_hz, dot, powers, tone};
 use crate::diagnosis::Evidence;
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::climb::golden_section;
-use crate::diagnosis::evidence::hann;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place, Volume};
-use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected};
+use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected, deviation_at_top};
 use crate::effects::Stage;
 
 /// Power that a response must let through to be undone in full.
@@ -131,9 +130,8 @@ impl<'a> Search<'a> {
 
     /// Standard deviation of a value, by the likelihood's curvature there.
     fn deviation(&self, (top, shape, value): Tried) -> f64 {
-        let step = 0.01 * value.abs();
-        let curvature = (2.0 * top - self.likelihood(shape, value + step) - self.likelihood(shape, value - step)) / (step * step);
-        if curvature > 0.0 { curvature.recip().sqrt().max(2e-3 * value.abs()) } else { 0.1 * value.abs() }
+        let deviation = deviation_at_top(|value| self.likelihood(shape, value), value, top, 0.01 * value.abs());
+        deviation.map_or(0.1 * value.abs(), |deviation| deviation.max(2e-3 * value.abs()))
     }
 
     fn candidate(&self, best: Tried, p_value: f64, look_alikes: Vec<&'static str>) -> Candidate {
@@ -181,14 +179,10 @@ struct Process {
 impl Process {
     fn new(field: &Field, low: f64, high: f64) -> Self {
         let samples = field.clutter[0].len();
-        let window = hann(samples);
         let long = 2 * samples;
         let mut density = vec![0.0; long];
         for chirp in &field.clutter {
-            let mut padded = vec![Complex64::ZERO; long];
-            (0..samples).for_each(|n| padded[n] = chirp[n] * window[n]);
-            FftPlanner::new().plan_fft_forward(long).process(&mut padded);
-            density.iter_mut().zip(&padded).for_each(|(sum, value)| *sum += value.norm_sqr() / field.clutter.len() as f64);
+            density.iter_mut().zip(powers(chirp, 2)).for_each(|(sum, power)| *sum += power / field.clutter.len() as f64);
         }
         let noise = field.variance.iter().sum::<f64>() / field.variance.len() as f64;
         let (first, last) = ((low * long as f64).floor() as usize, (high * long as f64).ceil() as usize);

@@ -10,6 +10,7 @@ use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::line::in_chirps;
 use crate::diagnosis::detectors::climb::climb;
 use crate::diagnosis::evidence::hann;
 use crate::diagnosis::statistics::corrected;
@@ -264,13 +265,8 @@ impl<'a> Spectra<'a> {
             }
             mean
         };
-        let means: Vec<Vec<Complex64>> = (0..self.evidence.cube.channels()).map(of_channel).collect();
-        let window = hann(samples);
-        let power = |at: f64| -> f64 {
-            let turn = |n: usize| Complex64::cis(-TAU * at * n as f64 / samples as f64) * window[n];
-            let of_channel = |mean: &Vec<Complex64>| mean.iter().enumerate().map(|(n, value)| value * turn(n)).sum::<Complex64>();
-            means.iter().map(|mean| of_channel(mean).norm_sqr()).sum()
-        };
+        let means: Vec<Complex64> = (0..self.evidence.cube.channels()).flat_map(of_channel).collect();
+        let power = |at: f64| in_chirps(&means, samples, at / samples as f64).iter().map(Complex64::norm_sqr).sum::<f64>();
         climb(power, bin as f64, 0.25, 1e-3).0
     }
 }
@@ -287,19 +283,9 @@ pub fn amplitudes(cube: &Cube, starts: &[f64], turns: Turns, fast: f64) -> Vec<C
     // What a mean over all chirps takes of the tone.
     let mean = phases.iter().sum::<Complex64>() / phases.len() as f64;
     let square: f64 = phases.iter().map(|turn| (turn - mean).norm_sqr()).sum();
-    let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
-    let window = hann(samples);
-    let weight: f64 = window.iter().sum();
     let of_channel = |channel: usize| {
-        let mut sum = Complex64::ZERO;
-        for frame in 0..frames {
-            for (index, chirp) in cube.channel(frame, channel).chunks_exact(samples).enumerate() {
-                let of_chirp: Complex64 =
-                    chirp.iter().zip(&in_chirp).zip(&window).map(|((value, turn), weight)| value * turn * *weight).sum();
-                sum += of_chirp * (phases[frame * loops + index] - mean).conj();
-            }
-        }
-        sum / (weight * square.max(f64::MIN_POSITIVE))
+        let chirps = (0..frames).flat_map(|frame| in_chirps(cube.channel(frame, channel), samples, fast));
+        chirps.zip(&phases).map(|(value, turn)| value * (turn - mean).conj()).sum::<Complex64>() / square.max(f64::MIN_POSITIVE)
     };
     (0..cube.channels()).into_par_iter().map(of_channel).collect()
 }

@@ -6,11 +6,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::line::{Line, Strongest, tone};
+use super::line::{Line, Strongest, along, in_chirps, tone, turned_back};
 use super::slow_spur::{self, SlowSpur};
 use super::wandering::{self, Wandering, deviation_bins};
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::evidence::{hann, spectrum, transform};
+use crate::diagnosis::evidence::{spectrum, transform};
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
 use crate::diagnosis::{Cube, Evidence, denoised};
@@ -78,10 +78,7 @@ fn aside(evidence: &Evidence) -> Option<Candidate> {
         .sum();
     let correction = Correction::samples(move |cube| {
         let amplitudes = amplitudes_of(cube, slow, fast);
-        cube.each_chirp(|[frame, channel, chirp], values| {
-            let amplitude = amplitudes[[frame, channel]];
-            values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
-        });
+        subtract(cube, |frame, channel| (slow, fast, amplitudes[[frame, channel]]));
     });
     let how = "where nothing of the room or the body can stay";
     let amplitudes = amplitudes.into_values();
@@ -97,10 +94,8 @@ fn among_the_slow(evidence: &Evidence) -> Option<Candidate> {
     }
     let correction = Correction::samples(move |cube| {
         let amplitudes = slow_spur::amplitudes(cube, &starts, turns, fast);
-        cube.each_chirp(|[frame, channel, chirp], values| {
-            let start = Complex64::cis(TAU * turns.per_frame * starts[frame]) * amplitudes[channel];
-            values.iter_mut().enumerate().for_each(|(n, value)| *value -= start * tone(slow, fast, chirp, n));
-        });
+        let start = |frame: usize| Complex64::cis(TAU * turns.per_frame * starts[frame]);
+        subtract(cube, |frame, channel| (slow, fast, start(frame) * amplitudes[channel]));
     });
     let how =
         "in step from frame to frame, at one beat frequency, where whatever turns like that and moves would have left its range";
@@ -116,15 +111,20 @@ fn wanders(evidence: &Evidence) -> Option<Candidate> {
     let turns = slow.clone();
     let correction = Correction::samples(move |cube| {
         let amplitudes = wandering::amplitudes(cube, &turns, fast);
-        cube.each_chirp(|[frame, channel, chirp], values| {
-            let amplitude = amplitudes[[frame, channel]];
-            values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(turns[frame], fast, chirp, n));
-        });
+        subtract(cube, |frame, channel| (turns[frame], fast, amplitudes[[frame, channel]]));
     });
     let how = "at one beat frequency, where whatever turns like that and moves would have left its range";
     let mean = slow.iter().sum::<f64>() / slow.len() as f64;
     let amplitudes = amplitudes.into_values();
     Some(candidate(evidence, Tone { slow: mean, fast, amplitudes, p_value, gain, how, correction }))
+}
+
+/// Takes a tone out of a cube; `of` says, by frame and channel, its turns per chirp and per sample and its amplitude.
+fn subtract(cube: &mut Cube, of: impl Fn(usize, usize) -> (f64, f64, Complex64) + Sync) {
+    cube.each_chirp(|[frame, channel, chirp], values| {
+        let (slow, fast, amplitude) = of(frame, channel);
+        values.iter_mut().enumerate().for_each(|(n, value)| *value -= amplitude * tone(slow, fast, chirp, n));
+    });
 }
 
 /// A tone that was found.
@@ -212,21 +212,13 @@ fn around(evidence: &Evidence, (slow, fast): (f64, f64), amplitudes: &Grid<Compl
 
 /// Whether static clutter at other ranges has the same line, in proportion to what it is: then everything is modulated.
 fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let window = hann(loops);
+    let samples = evidence.cube.dims[4];
     let own = fast * samples as f64;
     let apart = |bin: usize| (bin as f64 - own + 0.5 * samples as f64).rem_euclid(samples as f64) - 0.5 * samples as f64;
     let elsewhere: Vec<usize> = (0..samples).filter(|&bin| apart(bin).abs() > AROUND as f64).collect();
     let clutter: Vec<Vec<Complex64>> = evidence.clutter().chunks_exact(samples).map(spectrum).collect();
-    let line = |frame: usize, channel: usize| {
-        let mut line = vec![Complex64::ZERO; samples];
-        // The window's side lobes of static clutter are in proportion to it, too.
-        for (chirp, values) in evidence.moving(frame, channel).chunks_exact(samples).enumerate() {
-            let turn = Complex64::cis(-TAU * slow * chirp as f64) * window[chirp];
-            line.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * turn);
-        }
-        spectrum(&line)
-    };
+    // The window's side lobes of static clutter are in proportion to it, too.
+    let line = |frame: usize, channel: usize| spectrum(&turned_back(&evidence.moving(frame, channel), samples, slow));
     // All channels are modulated alike.
     let coherence = |&frame: &usize| {
         let (mut shared, mut lines, mut clutters) = (Complex64::ZERO, 0.0, 0.0);
@@ -245,19 +237,8 @@ fn is_sideband(evidence: &Evidence, slow: f64, fast: f64) -> bool {
 
 /// Least squares of the tone in every frame and channel, once static clutter is away.
 fn amplitudes_of(cube: &Cube, slow: f64, fast: f64) -> Grid<Complex64, 2> {
-    let [_, _, _, loops, samples] = cube.dims;
-    let in_chirp: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64)).collect();
-    let (window, slow_window) = (hann(samples), hann(loops));
-    let weight = window.iter().sum::<f64>() * slow_window.iter().sum::<f64>();
-    cube.by_channel(|frame, channel| {
-        let mut sum = Complex64::ZERO;
-        for (chirp, values) in cube.channel(frame, channel).chunks_exact(samples).enumerate() {
-            let of_chirp: Complex64 =
-                values.iter().zip(&in_chirp).zip(&window).map(|((value, turn), weight)| value * turn * *weight).sum();
-            sum += of_chirp * Complex64::cis(-TAU * slow * chirp as f64) * slow_window[chirp];
-        }
-        sum / weight
-    })
+    let samples = cube.dims[4];
+    cube.by_channel(|frame, channel| along(&in_chirps(cube.channel(frame, channel), samples, fast), slow))
 }
 
 /// Frequencies over slow and fast time, turns per chirp and per sample, where the tone is strongest.

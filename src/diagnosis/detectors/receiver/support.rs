@@ -6,11 +6,13 @@
 
 use std::f64::consts::TAU;
 
+use hybridsim_fft::FftPlanner;
 use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;
 
 use crate::diagnosis::Evidence;
 pub use crate::diagnosis::evidence::beat::{beat_hz, range_m, ranges_m};
+use crate::diagnosis::evidence::hann;
 
 /// Chirps longer than this would take too long.
 const MOST_SAMPLES: usize = 512;
@@ -44,6 +46,14 @@ pub fn dot(a: &[Complex64], b: &[Complex64]) -> Complex64 {
 /// Σ |a|².
 pub fn energy(a: &[Complex64]) -> f64 {
     a.iter().map(Complex64::norm_sqr).sum()
+}
+
+/// Powers of a chirp's DFT under a Hann window of unit energy, zero-padded to so many times its length.
+pub fn powers(chirp: &[Complex64], padding: usize) -> Vec<f64> {
+    let mut padded: Vec<Complex64> = chirp.iter().zip(hann(chirp.len())).map(|(value, weight)| value * weight).collect();
+    padded.resize(padding * chirp.len(), Complex64::ZERO);
+    FftPlanner::new().plan_fft_forward(padded.len()).process(&mut padded);
+    padded.iter().map(Complex64::norm_sqr).collect()
 }
 
 /// `ranges_m`: of static surfaces; `contrast`: energy of a mean chirp over the variance of the noise in a sample of it.

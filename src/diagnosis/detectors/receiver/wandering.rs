@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::line::{along, in_chirps, turned_back};
 use crate::diagnosis::cube::Cube;
 use crate::diagnosis::detectors::climb::climb;
 use crate::diagnosis::evidence::{Evidence, hann};
@@ -129,25 +130,12 @@ fn refined(evidence: &Evidence, mut slow: Vec<f64>, mut fast: f64) -> (Vec<f64>,
 
 /// Turns per sample at which some frames have most power.
 fn beat(evidence: &Evidence, frames: &[usize], slow: &[f64], start: f64) -> f64 {
-    let [_, _, _, loops, samples] = evidence.cube.dims;
-    let channels = evidence.cube.channels();
-    let window = hann(loops);
-    // One chirp for each frame and channel: the loops turned back and summed.
-    let of = |(frame, channel): (usize, usize)| {
-        let mut sum = vec![Complex64::ZERO; samples];
-        for (index, chirp) in evidence.moving(frame, channel).chunks_exact(samples).enumerate() {
-            let turn = Complex64::cis(-TAU * slow[frame] * index as f64) * window[index];
-            sum.iter_mut().zip(chirp).for_each(|(sum, value)| *sum += value * turn);
-        }
-        sum
-    };
+    let (channels, samples) = (evidence.cube.channels(), evidence.cube.dims[4]);
+    // One chirp for each frame and channel.
+    let of = |(frame, channel): (usize, usize)| turned_back(&evidence.moving(frame, channel), samples, slow[frame]);
     let all: Vec<(usize, usize)> = frames.iter().flat_map(|&frame| (0..channels).map(move |channel| (frame, channel))).collect();
-    let sums: Vec<Vec<Complex64>> = all.into_par_iter().map(of).collect();
-    let taper = hann(samples);
-    let power = |fast: f64| -> f64 {
-        let turns: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64) * taper[n]).collect();
-        sums.iter().map(|sum| sum.iter().zip(&turns).map(|(value, turn)| value * turn).sum::<Complex64>().norm_sqr()).sum()
-    };
+    let sums = all.into_par_iter().map(of).collect::<Vec<_>>().concat();
+    let power = |fast: f64| in_chirps(&sums, samples, fast).iter().map(Complex64::norm_sqr).sum::<f64>();
     climb(power, start, 0.5 / samples as f64, 1e-4 / samples as f64).0
 }
 
@@ -259,23 +247,12 @@ fn has_opposite(evidence: &Evidence, slow: &[f64], fast: f64, tone: &Grid<Comple
     mean_power_tail(frames.par_iter().map(power).collect::<Vec<f64>>().into_iter().sum::<f64>() / count, count) < OPPOSITE
 }
 
-/// Of each chirp, the amplitude at a beat frequency under a Hann window, without their mean.
+/// Of each chirp, the amplitude at a beat frequency, without their mean.
 fn of_chirps(signal: &[Complex64], samples: usize, fast: f64) -> Vec<Complex64> {
-    let window = hann(samples);
-    let all: f64 = window.iter().sum();
-    let turns: Vec<Complex64> = (0..samples).map(|n| Complex64::cis(-TAU * fast * n as f64) * (window[n] / all)).collect();
-    let mut chirps: Vec<Complex64> =
-        signal.chunks_exact(samples).map(|chirp| chirp.iter().zip(&turns).map(|(value, turn)| value * turn).sum()).collect();
+    let mut chirps = in_chirps(signal, samples, fast);
     let mean = chirps.iter().sum::<Complex64>() / chirps.len() as f64;
     chirps.iter_mut().for_each(|value| *value -= mean);
     chirps
-}
-
-/// Amplitude of chirps that turn so, under a Hann window.
-fn along(chirps: &[Complex64], slow: f64) -> Complex64 {
-    let window = hann(chirps.len());
-    let turned = |(i, value): (usize, &Complex64)| value * Complex64::cis(-TAU * slow * i as f64) * window[i];
-    chirps.iter().enumerate().map(turned).sum::<Complex64>() / window.iter().sum::<f64>()
 }
 
 /// Of the tone in every frame and channel, beside static clutter.

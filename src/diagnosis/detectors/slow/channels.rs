@@ -7,7 +7,6 @@
 use std::iter::repeat;
 
 use num_complex::Complex64;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::field::{INFORMATIVE_GAIN, most_have};
 use super::frame_clutter::FrameClutter;
@@ -174,8 +173,7 @@ fn chance(half: &Series, pattern: &[Complex64], frames: &[usize]) -> f64 {
         let (own, wanted) = (half.value[f], pattern[f]);
         [alike + half.weight[f] * (own * wanted.conj()).re, square + half.weight[f] * wanted.norm_sqr()]
     });
-    let law = StudentsT::new(0.0, 1.0, half.freedom);
-    if square > 0.0 { law.map_or(1.0, |law| law.sf(alike / (0.5 * square).sqrt())) } else { 1.0 }
+    if square > 0.0 { statistics::student_tail(alike / (0.5 * square).sqrt(), half.freedom) } else { 1.0 }
 }
 
 /// Of two halves' gains over some frames, without what the noise adds to each: about one where both change alike.
@@ -355,7 +353,7 @@ impl Judged {
         let known = self.known();
         let degrees: Vec<f64> = known.iter().map(|&f| (1.0 + self.series.value[f]).arg().to_degrees()).collect();
         let span = |values: &[f64]| {
-            let [low, high] = values.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
+            let [low, high] = statistics::bounds(values.iter().copied());
             high - low
         };
         let error = known.iter().map(|&f| (0.5 / self.series.weight[f]).sqrt()).sum::<f64>() / known.len().max(1) as f64;

@@ -8,7 +8,7 @@ use super::{
     periodogram::Periodogram,
 };
 use crate::diagnosis::detectors::climb::climb;
-use crate::diagnosis::statistics::UNDECIDED;
+use crate::diagnosis::statistics::{UNDECIDED, deviation_at_top};
 
 /// A sinusoid `a cos + b sin` of 2π f T, with its harmonics.
 #[derive(Clone, Debug)]
@@ -175,8 +175,7 @@ impl<'a> Search<'a> {
         }
         amplitudes.truncate(harmonics);
         let step = 0.05 / self.duration_s;
-        let curvature = (2.0 * gain - self.gain(frequency_hz - step) - self.gain(frequency_hz + step)) / (step * step);
-        let known = curvature.is_finite() && curvature > 0.0;
+        let deviation_hz = deviation_at_top(|hertz| self.gain(hertz), frequency_hz, gain, step);
         Line {
             frequency_hz,
             amplitudes,
@@ -184,7 +183,7 @@ impl<'a> Search<'a> {
             training_nats,
             held_out_nats: 0.0,
             tried: (self.highest_hz - self.lowest_hz) * self.duration_s * 3.0,
-            frequency_deviation_hz: if known { curvature.sqrt().recip() } else { 0.5 / self.duration_s },
+            frequency_deviation_hz: deviation_hz.unwrap_or(0.5 / self.duration_s),
             amplitude_deviation: (2.0 / weight).sqrt(),
             background: 1.0,
             freedom: None,

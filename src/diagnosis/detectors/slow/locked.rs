@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::settling::{Decay, ENOUGH};
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::mean_chirp;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::evidence::{Evidence, HANN_LOBE, hann, spectrum, transform_under};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Place};
 use crate::diagnosis::statistics::{corrected, mean_power_tail, median};
@@ -274,8 +275,6 @@ fn correction(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>)
     let real = evidence.is_real();
     Correction::samples(move |cube| {
         let [_, _, _, loops, samples] = cube.dims;
-        let mut planner = FftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
         let near = |cells: &[usize], k: usize| {
             let away = |cell: usize| (k + samples - cell).rem_euclid(samples).min((cell + samples - k).rem_euclid(samples));
             cells.iter().any(|&cell| away(cell) <= HANN_LOBE || real && away((samples - cell) % samples) <= HANN_LOBE)
@@ -292,11 +291,8 @@ fn correction(evidence: &Evidence, channels: Vec<usize>, cells: Vec<Vec<usize>>)
                 let clutter = mean_chirp(mean.chunks_exact(samples), samples);
                 for chirp in mean.chunks_exact_mut(samples) {
                     chirp.iter_mut().zip(&clutter).for_each(|(value, clutter)| *value -= clutter);
-                    forward.process(chirp);
-                    let keep = |k: usize| if near(cells, k) { 1.0 / samples as f64 } else { 0.0 };
-                    chirp.iter_mut().enumerate().for_each(|(k, value)| *value *= keep(k));
-                    inverse.process(chirp);
                 }
+                Filter::pass(samples, |k| near(cells, k)).apply(&mut mean);
                 mean
             })
             .collect();

@@ -220,12 +220,10 @@ fn two_valued(series: &Series, training: &[usize], held_out: &[usize], deviation
         }
     }
     let Levels { distance, share, .. } = levels;
-    let h = 0.02 * distance;
     let at = |distance: f64| gain(&Levels { distance, ..levels }, training);
-    let curvature = (2.0 * top - at(distance + h) - at(distance - h)) / (h * h);
     Some(Two {
         distance,
-        distance_error: if curvature > 0.0 { curvature.sqrt().recip() } else { distance },
+        distance_error: statistics::deviation_at_top(at, distance, top, 0.02 * distance).unwrap_or(distance),
         share,
         held_out_nats: gain(&levels, held_out),
     })

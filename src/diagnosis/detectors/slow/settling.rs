@@ -162,9 +162,8 @@ impl Pattern {
 
     /// Error of that length, by the curvature of the likelihood.
     fn length_deviation(&self, length: f64) -> f64 {
-        let h = 0.1 * length;
-        let curvature = (2.0 * self.fit(length).nats - self.fit(length + h).nats - self.fit(length - h).nats) / (h * h);
-        if curvature > 0.0 { curvature.sqrt().recip() } else { length }
+        let nats = |length: f64| self.fit(length).nats;
+        statistics::deviation_at_top(nats, length, nats(length), 0.1 * length).unwrap_or(length)
     }
 
     /// Log-likelihood that held-out frames gain by a function of the loop.

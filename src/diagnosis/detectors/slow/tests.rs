@@ -5,7 +5,6 @@ use num_complex::Complex64;
 use super::field::ahead;
 use super::find;
 use crate::diagnosis::behaviour::Behaviour;
-use crate::diagnosis::cube::Loaded;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, NINETY};
 use crate::effects;
@@ -20,30 +19,19 @@ fn evidence(seed: u64, change: impl Fn(f64, usize, usize, f64) -> Complex64) -> 
     radar.samples_per_chirp = 64;
     radar.frame_period_s = 0.1;
     radar.rx_m = (0..4).map(|i| [0.0019 * f64::from(i), 0.0, 0.0]).collect();
-    let dims = radar.dims();
     let mut normal = support::normal(seed);
     let returns: Vec<(f64, Vec<Complex64>)> =
         (0..40).map(|i| (5.0 + f64::from(i) * 1.1, (0..4).map(|_| 3.0 * Complex64::new(normal(), normal())).collect())).collect();
     let delay_of_bin = radar.sample_rate_hz / (64.0 * radar.slope_hz_per_s);
-    let mut samples = vec![];
-    for frame in 0..dims[0] {
-        for rx in 0..4 {
-            for index in 0..32 {
-                let time_s = radar.chirp_time_s(frame, 0, index);
-                for n in 0..64 {
-                    let value: Complex64 = returns
-                        .iter()
-                        .map(|(bin, amplitude)| {
-                            let tone = Complex64::cis(std::f64::consts::TAU * bin * f64::from(n) / 64.0);
-                            amplitude[rx] * tone * change(time_s, frame, index, bin * delay_of_bin)
-                        })
-                        .sum();
-                    samples.push(value + Complex64::new(normal(), normal()));
-                }
-            }
-        }
-    }
-    Evidence::new(Loaded::of_samples(radar, samples, [-1e3, 1e3]), None, None)
+    let clock = radar.clone();
+    Evidence::in_noise(radar, seed + 100, |[frame, rx, index, n]| {
+        let time_s = clock.chirp_time_s(frame, 0, index);
+        let value = |(bin, amplitude): &(f64, Vec<Complex64>)| {
+            let tone = Complex64::cis(std::f64::consts::TAU * bin * n as f64 / 64.0);
+            amplitude[rx] * tone * change(time_s, frame, index, bin * delay_of_bin)
+        };
+        returns.iter().map(value).sum()
+    })
 }
 
 fn best(evidence: &Evidence) -> Option<Candidate> {

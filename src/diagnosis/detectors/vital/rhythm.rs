@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use crate::diagnosis::detectors::climb::climb;
 use crate::diagnosis::statistics;
 
 /// Rates of breathing and of a heart, Hz.
@@ -84,19 +85,8 @@ impl Series<'_> {
             return None;
         }
         let misfit = |f: f64| self.fit(Some(f)).misfit;
-        let mut frequency_hz =
-            (0..=steps as usize).map(|i| lowest + i as f64 * step).min_by(|a, b| misfit(*a).total_cmp(&misfit(*b)))?;
-        let mut width = 0.5 * step;
-        while width > 1e-3 * step {
-            if misfit(frequency_hz + width) < misfit(frequency_hz) {
-                frequency_hz += width;
-            } else if misfit(frequency_hz - width) < misfit(frequency_hz) {
-                frequency_hz -= width;
-            } else {
-                width *= 0.5;
-            }
-        }
-        Some(frequency_hz)
+        let first = (0..=steps as usize).map(|i| lowest + i as f64 * step).min_by(|a, b| misfit(*a).total_cmp(&misfit(*b)))?;
+        Some(climb(|f| -misfit(f), first, 0.5 * step, 1e-3 * step).0)
     }
 
     /// Squared amplitudes of what is left at the frequencies around one, its harmonics left out.

@@ -12,11 +12,13 @@ use rayon::prelude::*;
 
 use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::cube::Cube;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::detectors::undo::delays_s;
 use crate::diagnosis::evidence::{Evidence, blackman_harris, hann};
 use crate::diagnosis::finding::{Candidate, Correction, Curve, Estimate, Place};
 use crate::diagnosis::statistics;
 use crate::effects::{self, Stage};
+use crate::paths::distance;
 use crate::radar::{Radar, SPEED_OF_LIGHT};
 
 /// Frequencies per bin.
@@ -85,12 +87,8 @@ fn support(evidence: &Evidence, frame: usize) -> [Option<[usize; 2]>; 2] {
     };
     let body = evidence.body.as_ref().and_then(|body| {
         let centre = radar.centre_m();
-        let distances = body
-            .frames
-            .get(frame)?
-            .iter()
-            .map(|p| (0..3).map(|axis| (p.position_m[axis] - centre[axis]).powi(2)).sum::<f64>().sqrt());
-        let [near, far] = distances.fold([f64::MAX, 0.0], |[near, far]: [f64; 2], d| [near.min(d), far.max(d)]);
+        let points = body.frames.get(frame)?.iter();
+        let [near, far] = statistics::bounds(points.map(|point| distance(point.position_m, centre)));
         (far > 0.0).then_some([near - BODY_MARGIN_M, far + BODY_MARGIN_M])
     });
     let room = evidence.room.as_ref().and_then(|room| {
@@ -291,16 +289,11 @@ fn of_frame(evidence: &Evidence, frame: usize, shifts: &[usize]) -> Vec<Sums> {
 
 /// Subtracts the paired echoes, of first order.
 fn undo(cube: &mut Cube, radar: &Radar, alpha: Complex64, ripple_hz: f64) {
-    let count = cube.dims[4];
-    let mut planner = FftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(count), planner.plan_fft_inverse(count));
-    let delays_s: Vec<f64> = delays_s(radar, count).collect();
+    let times_delay = Filter::new(&delays_s(radar, cube.dims[4]).map(Complex64::from).collect::<Vec<_>>());
     let sample_s = 1.0 / radar.sample_rate_hz;
     cube.each_chirp(|_, samples| {
         let mut delayed = samples.to_vec();
-        forward.process(&mut delayed);
-        delayed.iter_mut().zip(&delays_s).for_each(|(value, delay_s)| *value *= delay_s / count as f64);
-        inverse.process(&mut delayed);
+        times_delay.apply(&mut delayed);
         for (n, (value, delayed)) in samples.iter_mut().zip(delayed).enumerate() {
             let turn = alpha * Complex64::cis(TAU * ripple_hz * sample_s * n as f64);
             // i · 2 · imaginary part: the two echoes together are a pure phase.

@@ -95,7 +95,7 @@ impl Cells {
 }
 
 /// Power of a Hann window's transform so many cells beside its peak, 1 at the peak.
-fn hann_power(cells: f64) -> f64 {
+pub fn hann_power(cells: f64) -> f64 {
     let dirichlet = |x: f64| {
         let angle = std::f64::consts::PI * x;
         if angle.abs() < 1e-9 { 1.0 } else { angle.sin() / angle }

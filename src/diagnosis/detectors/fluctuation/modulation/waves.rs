@@ -2,11 +2,11 @@
 
 use std::ops::RangeInclusive;
 
-use hybridsim_fft::FftPlanner;
 use num_complex::Complex64;
 
 use super::chirps::{Chirps, reached};
 use super::line::Line;
+use crate::diagnosis::detectors::filter::Filter;
 use crate::diagnosis::detectors::fluctuation::sinusoid::Sinusoid;
 use crate::grid::Grid;
 
@@ -71,8 +71,7 @@ impl Chirps<'_> {
         let evidence = self.evidence;
         let [frames, .., samples] = evidence.cube.dims;
         let channels = evidence.cube.channels();
-        let mut planner = FftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        let filter = Filter::pass(samples, |bin| patch.contains(&bin));
         let mut waves = [vec![], vec![]];
         for channel in 0..channels {
             let moving: Vec<Vec<Complex64>> = (0..frames).map(|frame| evidence.moving(frame, channel)).collect();
@@ -80,11 +79,7 @@ impl Chirps<'_> {
             let fitted: Vec<[Complex64; 2]> = (0..samples).map(of_sample).collect();
             for (part, waves) in waves.iter_mut().enumerate() {
                 let mut wave: Vec<Complex64> = fitted.iter().map(|fitted| fitted[part]).collect();
-                forward.process(&mut wave);
-                for (bin, value) in wave.iter_mut().enumerate() {
-                    *value *= if patch.contains(&bin) { 1.0 / samples as f64 } else { 0.0 };
-                }
-                inverse.process(&mut wave);
+                filter.apply(&mut wave);
                 waves.extend(wave);
             }
         }

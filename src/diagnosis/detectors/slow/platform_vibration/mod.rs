@@ -15,7 +15,7 @@ use crate::diagnosis::behaviour::Behaviour;
 use crate::diagnosis::detectors::climb::climb;
 use crate::diagnosis::evidence::Evidence;
 use crate::diagnosis::finding::{Candidate, Correction, Estimate, NINETY, Place};
-use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected};
+use crate::diagnosis::statistics::{UNDECIDED, chi2_tail, corrected, deviation_at_top};
 use crate::effects::{self, Stage};
 
 use amplitude::amplitude;
@@ -73,8 +73,7 @@ pub fn find(evidence: &Evidence) -> Option<Candidate> {
         return None;
     }
     let (radians, deviation) = amplitude(evidence, &cells, &vibration)?;
-    let curvature = (2.0 * top - gain(frequency - 0.1 * step) - gain(frequency + 0.1 * step)) / (0.1 * step).powi(2);
-    let frequency_deviation = if curvature > 0.0 { curvature.sqrt().recip() } else { step };
+    let frequency_deviation = deviation_at_top(gain, frequency, top, 0.1 * step).unwrap_or(step);
     let metres = evidence.radar.wavelength_m() / (2.0 * TAU);
     let measured = Measured {
         amplitude_m: radians.abs() * metres,

@@ -109,7 +109,7 @@ pub fn shared(spectra: &[Spectrum], part: Part) -> Option<Shared> {
         Shared { part, log_bets, sharing, informative, members }
     };
     let all: Vec<Shared> = (0..count).into_par_iter().map(of_first).collect();
-    let log_bets = log_sum(all.iter().map(|shared| shared.log_bets)) - (count as f64).ln();
+    let log_bets = statistics::log_sum(all.iter().map(|shared| shared.log_bets)) - (count as f64).ln();
     let best = all.into_iter().max_by(|a, b| a.log_bets.total_cmp(&b.log_bets))?;
     Some(Shared { log_bets, ..best })
 }
@@ -155,13 +155,7 @@ fn bet(reference: &Reference, spectrum: &Spectrum) -> (f64, f64) {
         }
         most += predicted.norm_sqr() / variance / SETS;
     }
-    (log_sum(returns.into_iter()) - (returns.len() as f64).ln(), most)
-}
-
-/// Logarithm of a sum of exponentials.
-fn log_sum(logarithms: impl Iterator<Item = f64> + Clone) -> f64 {
-    let top = logarithms.clone().fold(f64::NEG_INFINITY, f64::max);
-    top + logarithms.map(|value| (value - top).exp()).sum::<f64>().ln()
+    (statistics::log_sum(returns.into_iter()) - (returns.len() as f64).ln(), most)
 }
 
 /// ln I₀(x) of a positive number (Abramowitz and Stegun 1964, 9.8.1 and 9.8.2; errors below 2e-7).
