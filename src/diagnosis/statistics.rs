@@ -22,17 +22,22 @@ pub fn exponential_scale(values: &mut [f64], quantile: f64) -> f64 {
 
 /// Probability that a χ² of so many degrees of freedom exceeds a value.
 pub fn chi2_tail(value: f64, freedom: f64) -> f64 {
-    if value <= 0.0 { 1.0 } else { ChiSquared::new(freedom).map_or(1.0, |law| law.sf(value)) }
+    if says_nothing(value) { 1.0 } else { ChiSquared::new(freedom).map_or(1.0, |law| law.sf(value)) }
+}
+
+/// Whether every value exceeds this one; what is no number is exceeded, too: it is no evidence.
+fn says_nothing(value: f64) -> bool {
+    value.is_nan() || value <= 0.0
 }
 
 /// Probability that the mean of `count` independent powers of mean 1 (exponential) exceeds a value.
 pub fn mean_power_tail(mean: f64, count: f64) -> f64 {
-    if mean <= 0.0 { 1.0 } else { Gamma::new(count, count).map_or(1.0, |law| law.sf(mean)) }
+    if says_nothing(mean) { 1.0 } else { Gamma::new(count, count).map_or(1.0, |law| law.sf(mean)) }
 }
 
 /// Probability that a ratio of variances of so many degrees of freedom each exceeds this.
 pub fn fisher_tail(ratio: f64, above: f64, below: f64) -> f64 {
-    if ratio <= 0.0 {
+    if says_nothing(ratio) {
         return 1.0;
     }
     // Whose ratio to itself the law would take.
@@ -49,7 +54,7 @@ pub fn normal_tails(z: f64) -> f64 {
 
 /// Probability that Student's law of so many degrees of freedom exceeds a value.
 pub fn student_tail(t: f64, freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(t))
+    if t.is_nan() { 1.0 } else { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(t)) }
 }
 
 /// The ratio of the sums of values and their weights, and the probability that it is as much above zero where the values are independent
@@ -194,6 +199,9 @@ mod tests {
         assert!((chi2_tail(3.841, 1.0) - 0.05).abs() < 1e-4);
         assert!((normal_tails(1.96) - 0.05).abs() < 1e-4);
         assert!([f64::INFINITY, f64::MAX].map(|ratio| fisher_tail(ratio, 6.0, 20.0)) == [0.0; 2]);
+        // What is no number is no evidence.
+        let of_none = [chi2_tail(f64::NAN, 2.0), mean_power_tail(f64::NAN, 2.0), fisher_tail(f64::NAN, 2.0, 9.0)];
+        assert_eq!((of_none, student_tail(f64::NAN, 9.0)), ([1.0; 3], 1.0));
         assert!((mean_power_tail(2.0, 1.0) - (-2.0f64).exp()).abs() < 1e-9);
         assert!((poisson_tail(1, 0.1) - (1.0 - (-0.1f64).exp())).abs() < 1e-9);
         assert!((poisson_tail(2, 0.1) - (1.0 - 1.1 * (-0.1f64).exp())).abs() < 1e-9);

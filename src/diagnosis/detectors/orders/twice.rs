@@ -106,11 +106,12 @@ fn pattern(amplitude: &[Complex64], kind: usize) -> Vec<Complex64> {
     amplitude.iter().map(of).collect()
 }
 
-/// Complex least squares of values on the first orders.
+/// Complex least squares of values on the first orders; none where these are not independent.
 fn solve(turned: &[Complex64], values: &[Complex64], count: usize) -> Option<DVector<Complex64>> {
     let rows = DMatrix::from_fn(turned.len(), count, |i, k| powers(turned[i])[k]);
     let adjoint = rows.adjoint();
-    (&adjoint * &rows).lu().solve(&(adjoint * DVector::from_column_slice(values)))
+    let solved = (&adjoint * &rows).lu().solve(&(adjoint * DVector::from_column_slice(values)))?;
+    solved.iter().all(|factor| factor.is_finite()).then_some(solved)
 }
 
 fn along(evidence: &Evidence, data: &Frames, course: &Course, bin: usize, kind: usize, pattern: &[Complex64]) -> Option<Along> {
