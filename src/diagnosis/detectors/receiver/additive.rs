@@ -45,10 +45,7 @@ fn beside(evidence: &Evidence, field: Field) -> Result<Vec<Candidate>, [f64; 2]>
         return Ok(vec![]);
     }
     let images = Images::new(evidence, &field);
-    let elements = choose(evidence, &field, &images);
-    if let Some(wider_m) = wider_m(evidence, &field, &elements) {
-        return Err(wider_m);
-    }
+    let elements = choose(evidence, &field, &images, false);
     let fitted = field.fit(&templates(&elements, &images));
     let free_gain = field.gain(None, &field.mean);
     let explained = field.gain(None, &fitted.predicted);
@@ -64,8 +61,13 @@ fn beside(evidence: &Evidence, field: Field) -> Result<Vec<Candidate>, [f64; 2]>
             && found.likelihood >= ENOUGH * (free - 0.5 * field.freedom())
             && (!named || found.likelihood > found.additive)
     });
+    if let Some(found) = filter.as_ref().filter(|found| found.chance >= UNLIKELY) {
+        return Ok(vec![found.candidate.clone()]);
+    }
+    if let Some(wider_m) = wider_m(evidence, &field, &choose(evidence, &field, &images, true)) {
+        return Err(wider_m);
+    }
     Ok(match filter {
-        Some(found) if found.chance >= UNLIKELY => vec![found.candidate],
         None if explained >= ENOUGH * free_gain => {
             // The field is sure; what an element's numbers are is another question.
             let chosen = Chosen { evidence, field: &field, images: &images, elements: &elements, fitted: &fitted };

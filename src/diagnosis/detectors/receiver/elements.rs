@@ -108,10 +108,13 @@ pub fn unknowns(element: &Element, channels: usize) -> f64 {
     }
 }
 
-/// The elements that a recording holds. A constant only where the others leave it estimable.
-pub fn choose(evidence: &Evidence, field: &Field, images: &Images) -> Vec<Element> {
-    // Something may stand where the room has nothing, whether or not that has a name.
-    let is_known = |element: &Element| matches!(element, Element::Return(_)) || evidence.info(element.id()).is_some();
+/// The elements that a recording holds. A constant only where the others leave it estimable. `returns`: whether something may stand where
+/// the room has nothing, which needs no name.
+pub fn choose(evidence: &Evidence, field: &Field, images: &Images, returns: bool) -> Vec<Element> {
+    let is_known = |element: &Element| match element {
+        Element::Return(_) => returns,
+        _ => evidence.info(element.id()).is_some(),
+    };
     let all = chosen(evidence, field, images, is_known);
     if inflation_of_offset(field, &all) < MOST_INFLATED {
         return all;
